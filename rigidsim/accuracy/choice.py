@@ -1,10 +1,12 @@
 """Choice of the cheapest setting that keeps the attitude as accurate as ``[integrator] accuracy`` asks, and
 of the most averaged model whose measured error is within ``accuracy_axis``.
 
-Settings are tried over the motion's beginning, which is the whole of a short run, against a better one
-(``rigidsim.accuracy.forecast``); what wasn't tried follows from what was: errors of rounding are in
-proportion to the precision's epsilon, those of the series to the tolerance. A choice is a forecast: the
-accuracy that the run really kept is certified afterwards (``rigidsim.accuracy.certificate``).
+Settings are tried over the motion's beginning, which is the whole of a short run, against a better one; what
+wasn't tried follows from what was: errors of rounding are in proportion to the precision's epsilon, those of
+the series to the tolerance. The end follows from the beginning by laws: errors of rounding grow like t^1.5
+(Brouwer 1937), or t with projected invariants; those of the series at most like t^2; both times the motion's
+own growth. A choice is a forecast: the accuracy that the run really kept is certified afterwards
+(``rigidsim.accuracy.certificate``).
 
 Choices depend on counts alone, never on a clock, so that a config always chooses the same.
 """
@@ -13,10 +15,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from rigidsim.accuracy.forecast import Forecasts
+from rigidsim.accuracy.comparison import spread_times
+from rigidsim.accuracy.error_law import CLOSED_FORM
 from rigidsim.accuracy.models.modelling import measure_modelling
 from rigidsim.accuracy.models.side_by_side import Unmeasured
-from rigidsim.accuracy.motion import KnownMotion
+from rigidsim.accuracy.motion import PILOT_STEPS, KnownMotion, motion_of
+from rigidsim.accuracy.reference import stepped_reference
 from rigidsim.accuracy.setting import (
     STEP_SECONDS,
     Setting,
@@ -27,7 +31,7 @@ from rigidsim.accuracy.setting import (
     setting_of,
     wanted,
 )
-from rigidsim.accuracy.trial import TrialProgress
+from rigidsim.accuracy.trial import TrialProgress, Trials
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load import Load
 from rigidsim.scene.choices import (
@@ -41,22 +45,28 @@ from rigidsim.scene.choices import (
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.integrator_table import LARGEST_DIGITS
 from rigidsim.scene.readable import span_text
+from rigidsim.scene.scene import build_scene
 from rigidsim.solve.problem import prepare
 
-_DIGITS: dict[str | int, range] = {"single": range(4, 8), "double": range(4, 16), "extended": range(13, 19)}
-"""Tolerances of each precision, as negative powers of ten; looser ones are no cheaper than the one before."""
 _LADDER: tuple[str | int, ...] = ("double", "extended", "quadruple", 50, 75, 100, 150, 200, LARGEST_DIGITS)
+_LOOSEST = 4  # negative power of ten of the loosest tolerance
 
-
+# With these 199 of 200 random runs kept what they were asked for, and 96 of 100 cost at most twice the
+# cheapest setting of a full search (experiments/README.md).
 _SAFETY, _OPTIMISTIC, _OPTIMISTIC_LONG, _PROGRESS = 3.0, 0.6, 3.0, 0.2
 """Ratio of the accuracy to the largest acceptable forecast; ratios of forecast to accuracy up to which a
 setting is tried if the next precision costs ten times as much, of a short run, and of a long one, which
 mostly does better than its beginning forecasts; ratio to a failed setting's forecast that the next one must
 promise.
-
-With these 199 of 200 random runs kept what they were asked for, and 96 of 100 cost at most twice the cheapest
-setting of a full search (experiments/README.md).
 """
+_TIMES = 200  # compared
+_BASE_TOLERANCE = 1e-8  # of the trial that all other tolerances are first forecast from
+_SATURATED = 0.05  # rad: past which errors are no longer small, and don't scale
+_CLEARLY = 20.0  # ratio of accuracy to round-off law from which rounding needn't be measured
+_EXPONENTIAL, _POWER = 5.0, 2.0  # powers of time: past which growth is exponential; largest of any other
+_SERIES, _PROJECTED, _ROUNDING = 1.2, 1.0, 1.5
+"""Least powers of time for errors of series, and of rounding with projected invariants and without."""
+_LARGEST_EXPONENT = 600.0  # keeps products within doubles
 
 
 @dataclass(frozen=True)
@@ -106,45 +116,25 @@ def choose(
     """The cheapest setting whose forecast keeps an attitude accuracy (rad, at the end), within what the
     config leaves open. Raises ``ConfigError`` if none does.
     """
-    forecasts = Forecasts(experiment, accuracy, loads, told)
-    motion = forecasts.motion
-
-    def counted(setting: Setting) -> float:
-        return cost(setting, motion.steps, forecasts.samples)
-
-    candidates = sorted(_candidates(experiment, motion), key=counted)
+    forecasts = _Forecasts(experiment, accuracy, loads, told)
+    candidates = sorted(_candidates(experiment, forecasts.motion), key=forecasts.cost)
     most = accuracy / _SAFETY
-    optimistic_limit = accuracy * (_OPTIMISTIC_LONG if forecasts.part < 1 else _OPTIMISTIC)
+    optimistic = accuracy * (_OPTIMISTIC_LONG if forecasts.part < 1 else _OPTIMISTIC)
     if beyond is not None:
-        optimistic_limit = 0.0
-        most = min(most, _PROGRESS * forecasts.error(beyond))
-        spent = counted(beyond)
-        candidates = [s for s in candidates if counted(s) > spent]
+        optimistic, most = 0.0, min(most, _PROGRESS * forecasts.error(beyond))
+        candidates = [s for s in candidates if forecasts.cost(s) > forecasts.cost(beyond)]
+    last = {s.precision: s for s in candidates if s.has_steps}  # past which only another precision is better
     while True:
-        choice = _first(forecasts, candidates, most, optimistic_limit)
-        if choice is None:
+        limits = ((s, optimistic if s in last.values() else most) for s in candidates)
+        found = next((s for s, limit in limits if forecasts.error(s) <= max(limit, most)), None)
+        if found is None:
             reached = min(candidates, key=forecasts.error, default=None)
             raise ConfigError(Problem(f"[integrator] {key}", _unreachable(forecasts, reached, accuracy)))
-        if not forecasts.measure(choice.setting):
-            return choice  # it was tried, or is too dear to be
-
-
-def _first(
-    forecasts: Forecasts, candidates: list[Setting], most: float, optimistic_limit: float
-) -> Choice | None:
-    """The first candidate whose forecast is within ``most``, or within ``optimistic_limit`` if only another
-    precision would do better; None if there is none.
-    """
-    motion = forecasts.motion
-    for n, setting in enumerate(candidates):
-        error = forecasts.error(setting)
-        if error <= most:
-            return Choice(setting, error, forecasts.why(setting), motion)
-        dearer = all(s.precision != setting.precision for s in candidates[n + 1 :] if s.has_steps)
-        if dearer and setting.has_steps and error <= optimistic_limit:
-            why = f"{forecasts.why(setting)}; the next precision costs ten times as much"
-            return Choice(setting, error, why, motion)
-    return None
+        if not forecasts.measure(found):  # it was tried, or is too dear to be
+            why = forecasts.why(found)
+            if (error := forecasts.error(found)) > most:
+                why += "; the next precision costs ten times as much"
+            return Choice(found, error, why, forecasts.motion)
 
 
 def _candidates(experiment: Experiment, motion: KnownMotion) -> list[Setting]:
@@ -153,46 +143,132 @@ def _candidates(experiment: Experiment, motion: KnownMotion) -> list[Setting]:
     given = integrator.model_fields_set
     formulation = attitude_variables(integrator.formulation)
     precisions = (integrator.precision,) if "precision" in given else _LADDER
+    held = [integrator.hold_invariants is True] if "hold_invariants" in given else [False, motion.holds]
     found: list[Setting] = []
     if motion.exact and (integrator.method == motion.exact or "method" not in given):
         open_ = variables_named(formulation).in_closed_form and not experiment.config.events
-        open_ = open_ and not (integrator.hold_invariants is True and "hold_invariants" in given)
+        open_ = open_ and not ("hold_invariants" in given and held[0])
         found += [Setting(p, method=motion.exact) for p in precisions if p != "extended" and open_]
     if not integrator.has_steps:
         return found
-    plain = Setting(formulation=formulation, method=integrator.method)
-    holds = [integrator.hold_invariants is True] if "hold_invariants" in given else [False, True]
-    looser = 13
+    loosest = _LOOSEST
     for precision in precisions:
         finest = math.floor(-math.log10(epsilon(precision)))
-        digits = _DIGITS.get(precision, range(looser, finest + 1))
-        tolerances: list[float | None] = [None, *(float(f"1e-{d}") for d in digits)]
+        tolerances = [None, *(float(f"1e-{d}") for d in range(loosest, finest + 1))]
         if "tolerance" in given:
             tolerances = [setting_of(experiment).tolerance]
-        looser = finest
-        found += [
-            replace(plain, precision=precision, tolerance=tolerance, hold_invariants=projected)
-            for tolerance in tolerances
-            for projected in holds
-            if motion.holds or not projected or "hold_invariants" in given
-        ]
+        loosest = finest - 2  # what is looser costs less in the precision before
+        every = ((tolerance, hold) for tolerance in tolerances for hold in dict.fromkeys(held))
+        found += [Setting(precision, t, formulation, hold, integrator.method) for t, hold in every]
     return found
 
 
-def _unreachable(forecasts: Forecasts, best: Setting | None, accuracy: float) -> str:
+def _unreachable(forecasts: "_Forecasts", best: Setting | None, accuracy: float) -> str:
     if best is None:
         return f"given {accuracy:.3g} rad, but the other keys of [integrator] leave no setting to choose from"
-    motion = forecasts.motion
-    seconds = cost(best, motion.steps, forecasts.samples) * STEP_SECONDS
     reached = forecasts.error(best)
     what = f"would be right to about {reached:.2g} rad" if reached < 1 else "would keep no digit"
     text = (
         f"given {accuracy:.3g} rad at the end, which no setting open to it reaches; the best, {best.title}, "
-        f"{what}, in about {span_text(seconds, 2)}"
+        f"{what}, in about {span_text(forecasts.cost(best) * STEP_SECONDS, 2)}"
     )
-    if (rate := motion.growth.growth_rate) > 0:
+    if (rate := forecasts.motion.growth.growth_rate) > 0:
         text += f"; errors here grow e-fold every {span_text(1 / rate)}, so choose a nearer end"
     return text + "; ask for less, or leave precision, tolerance and method open"
+
+
+class _Forecasts:
+    """Errors of settings at a run's end, rad, measured if that is cheap, otherwise forecast from what was
+    measured over the first ``part`` of the run.
+    """
+
+    def __init__(
+        self,
+        experiment: Experiment,
+        accuracy: float,
+        loads: Sequence[Load],
+        told: TrialProgress | None,
+    ) -> None:
+        self._accuracy, self._trials = accuracy, Trials(experiment, loads, told)
+        self.motion = motion_of(experiment, loads=loads)
+        self._samples = build_scene(experiment).samples.count
+        self.part = min(1.0, PILOT_STEPS / self.motion.steps)
+        self._times = spread_times(experiment, _TIMES, self.part)
+        self._measured: dict[Setting, float] = {}
+
+    def cost(self, setting: Setting) -> float:
+        """See ``rigidsim.accuracy.setting``."""
+        return cost(setting, self.motion.steps, self._samples)
+
+    def error(self, setting: Setting) -> float:
+        """Forecast error; measures what it needs."""
+        if not setting.has_steps:
+            return CLOSED_FORM * epsilon(setting.precision) + self.motion.labels(setting.precision)
+        rounding = self.motion.rounding(setting.precision)
+        if not self._obvious(setting):
+            base = replace(setting, precision="double", tolerance=None)
+            rounding = self._tried(base) * epsilon(setting.precision) / epsilon(base.precision)
+        return rounding if setting.tolerance is None else max(rounding, self._series(setting))
+
+    def measure(self, setting: Setting) -> bool:
+        """Try a setting itself, if worthwhile; False if nothing new can be learnt."""
+        loose = setting.has_steps and setting.tolerance is not None
+        if not loose or setting in self._measured or setting.bits > 53:
+            return False
+        self._tried(setting)
+        return True
+
+    def why(self, setting: Setting) -> str:
+        """Origin of the forecast, for the summary."""
+        if not setting.has_steps:
+            return "its solution in closed form costs less than its steps"
+        if setting.tolerance is None and self._obvious(setting):
+            return "by the law of rounding errors"
+        extent = "whole run" if self.part >= 1 else f"first {span_text(self.part * self.motion.seconds)}"
+        if setting.bits <= 53:
+            return f"tried over the {extent} against a better solution"
+        return f"from trials in double precision over the {extent}, whose errors shrink with epsilon"
+
+    def _obvious(self, setting: Setting) -> bool:
+        """Whether rounding is clearly negligible."""
+        return self.motion.rounding(setting.precision) * _CLEARLY <= self._accuracy
+
+    def _series(self, setting: Setting) -> float:
+        """Error of a tolerance: measured, or in proportion to the nearest one measured."""
+        if setting in self._measured:
+            return self._measured[setting]
+        self._tried(replace(setting, precision="double", tolerance=_BASE_TOLERANCE))
+        alike = [s for s in self._measured if s.tolerance and s.hold_invariants == setting.hold_invariants]
+        step = setting.step_tolerance
+        nearest = min(alike, key=lambda s: abs(math.log(s.step_tolerance / step)))
+        return self._measured[nearest] * step / nearest.step_tolerance
+
+    def _tried(self, setting: Setting) -> float:
+        """Error at the run's end, from that over the part tried, against a better setting: in double
+        precision if rounding is negligible.
+        """
+        if setting not in self._measured:
+            precision = "double" if self._obvious(setting) else "extended"
+            steps = self.motion.steps * self.part
+            better = stepped_reference(precision, self.motion, steps, setting.formulation)
+            errors = self._trials.compare(setting, better, self._times)
+            if errors is None:
+                self._measured[setting] = math.inf
+            elif (late := float(errors.max())) > _SATURATED:  # only the law says how large it would be
+                self._measured[setting] = max(late, self.motion.error(setting.level))
+            else:
+                late, early = max(late, epsilon(setting.precision)), float(errors[: len(errors) // 4].max())
+                self._measured[setting] = late if self.part >= 1 else self._at_end(early, late, setting)
+        return self._measured[setting]
+
+    def _at_end(self, early: float, late: float, setting: Setting) -> float:
+        """Error from the largest over the first quarter of a trial and over all of it."""
+        growth, longer = math.log(late / max(early, late * 1e-300)), 1 / self.part
+        power = growth / math.log(4)
+        if power > _EXPONENTIAL:
+            return late * math.exp(min((longer - 1) / 0.75 * growth, _LARGEST_EXPONENT))
+        law = _SERIES if setting.tolerance else _PROJECTED if setting.hold_invariants else _ROUNDING
+        return late * longer ** max(law, min(power, _POWER))
 
 
 CHEAPEST_FIRST = (ORBIT_AVERAGED, SPIN_AVERAGED)

@@ -114,6 +114,10 @@ class KnownMotion:
         """Attitude error at the end from rounding, rad."""
         return self.error(epsilon(precision))
 
+    def labels(self, precision: str | int) -> float:
+        """How far the body turns, rad, in the rounding of the last sample's time."""
+        return epsilon(precision) / 2 * self.rate * self.seconds
+
 
 def motion_of(experiment: Experiment, *, loads: Sequence[Load] = ()) -> KnownMotion:
     """Examine the beginning of a motion (some tens of milliseconds)."""

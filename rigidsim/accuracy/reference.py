@@ -7,8 +7,7 @@ difference from another as their errors per step are, but for scatter.
 """
 
 import math
-from dataclasses import dataclass, replace
-from enum import Enum
+from dataclasses import replace
 
 from rigidsim.accuracy.motion import KnownMotion
 from rigidsim.accuracy.setting import Setting, epsilon
@@ -18,8 +17,8 @@ from rigidsim.scene.choices import DEFAULT_FORMULATION, variables_named
 LEAST_DIGITS = 50
 """Least digits of a multi-precision reference: 16 beyond quadruple precision."""
 _SPARE_DIGITS = 20  # of a reference for digits, beyond theirs
-_EXTENDED_STEPS, _WIDE_STEPS = 1e5, 1e5
-"""Steps past which extended precision (a second) isn't the first choice, quadruple (a minute) isn't used."""
+MANY_STEPS = 1e5
+"""Steps that take a second in extended precision, and a minute in quadruple."""
 _CLEARLY = 0.01  # error of a reference with many digits, over the accuracy or the run's errors per step
 
 
@@ -30,66 +29,32 @@ def scatter_of(setting: Setting, steps: float) -> float:
     return 100.0 if setting.tolerance is None else 100.0 + 10.0 * math.sqrt(steps)
 
 
-class ReferenceKind(Enum):
-    """Kind of a reference."""
-
-    CLOSED_FORM = "closed form"
-    FINER = "smaller errors per step"
-    PEER = "an equal in other variables"
-
-
-@dataclass(frozen=True)
-class Reference:
-    """A reference against which a solution may be held."""
-
-    setting: Setting
-    kind: ReferenceKind = ReferenceKind.FINER
-
-    @property
-    def how(self) -> str:
-        """Description for the summary."""
-        if self.kind is ReferenceKind.CLOSED_FORM:
-            return f"against the closed form, {self.setting.precision}"
-        if self.kind is ReferenceKind.PEER:
-            return f"against {self.setting.title}, which is independent but no more accurate"
-        return f"against {self.setting.title}"
-
-
-def references(setting: Setting, motion: KnownMotion, accuracy: float) -> list[Reference]:
+def references(setting: Setting, motion: KnownMotion, accuracy: float) -> list[Setting]:
     """References for a whole run, from cheap to costly, as good as an accuracy (rad) needs."""
-    loose = setting.has_steps and setting.tolerance is not None
-    stepped: list[str | int] = []
-    if setting.bits <= 53 and loose and motion.steps > _EXTENDED_STEPS:
-        stepped.append("double")
-    if setting.bits <= 53 and (motion.steps <= _EXTENDED_STEPS or not motion.exact):
-        stepped.append("extended")
-    costly: list[Reference] = []
-    if motion.exact and setting.has_steps:
-        costly.append(exact_beyond(setting.precision, motion.exact))
-    elif motion.steps <= _WIDE_STEPS:
-        stepped += ["quadruple"] * (setting.bits <= 64)
-        stepped.append(digits_beyond(setting.precision))
-    elif motion.exact:  # too long for steps: the closed form must check itself, with many more digits
-        costly.append(exact_to(digits_beyond(setting.precision), motion.exact))
+    many = motion.steps > MANY_STEPS
+    found: list[str | int] = []
+    if setting.bits <= 53 and setting.has_steps and setting.tolerance is not None and many:
+        found.append("double")
+    if setting.bits <= 53 and not (many and motion.exact):
+        found.append("extended")
+    costly: list[Setting] = []
+    if motion.exact and (setting.has_steps or many):
+        # it costs the same at any horizon; a closed form too long for steps is checked with many more digits
+        digits = "quadruple" if setting.bits <= 64 and setting.has_steps else digits_beyond(setting.precision)
+        costly.append(Setting(digits, method=motion.exact))
+    elif not many:
+        found += ["quadruple"] * (setting.bits <= 64)
+        found.append(digits_beyond(setting.precision))
     else:
         other = variables_named(setting.formulation).checked_by
-        peer = replace(setting, formulation=other, tolerance=None)
-        costly.append(Reference(peer, ReferenceKind.PEER))
-    finer = [stepped_reference(p, motion, motion.steps) for p in stepped]
-    return [
-        *(Reference(_only_as_good(s, setting, motion, accuracy)) for s in finer),
-        *costly,
-    ]
+        costly.append(replace(setting, formulation=other, tolerance=None))
+    finer = [stepped_reference(precision, motion, motion.steps) for precision in found]
+    return [*(_only_as_good(one, setting, motion, accuracy) for one in finer), *costly]
 
 
 def digits_beyond(precision: str | int) -> int:
     """Digits of a reference for a precision."""
     return max(LEAST_DIGITS, int(working_bits(precision) * 0.302) + _SPARE_DIGITS)
-
-
-def exact_beyond(precision: str | int, method: str) -> Reference:
-    """The closed form with more digits than a precision; it costs the same at any horizon."""
-    return exact_to("quadruple" if working_bits(precision) <= 64 else digits_beyond(precision), method)
 
 
 def stepped_reference(
@@ -101,7 +66,7 @@ def stepped_reference(
     """An integration at a precision's epsilon. Invariants are projected where that is right: with more digits
     than 64 bits rounding doesn't matter, nor does it over a short way in double precision.
     """
-    projected = working_bits(precision) <= 64 and (precision != "double" or steps > _EXTENDED_STEPS)
+    projected = working_bits(precision) <= 64 and (precision != "double" or steps > MANY_STEPS)
     return Setting(precision, formulation=formulation, hold_invariants=projected and motion.holds)
 
 
@@ -113,8 +78,3 @@ def _only_as_good(reference: Setting, setting: Setting, motion: KnownMotion, acc
     tolerance /= scatter_of(replace(reference, tolerance=1.0), motion.steps)
     tolerance = min(tolerance, _CLEARLY * setting.level)
     return replace(reference, tolerance=tolerance) if tolerance > epsilon(reference.precision) else reference
-
-
-def exact_to(precision: str | int, method: str) -> Reference:
-    """The closed form in a precision, or to so many digits."""
-    return Reference(Setting(precision, method=method), ReferenceKind.CLOSED_FORM)

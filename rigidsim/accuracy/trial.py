@@ -16,8 +16,7 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import fraction_of
 from rigidsim.scene.sample_times import SampleTimes
 from rigidsim.scene.scene import Scene, build_scene
-from rigidsim.solve.assembly import assemble, sampler
-from rigidsim.solve.evaluate import Evaluator
+from rigidsim.solve.assembly import Assembly, assemble, sampler
 from rigidsim.solve.problem import InitialValueProblem, prepare_scene
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import Check, Progress, SampleReceiver
@@ -29,43 +28,56 @@ TrialProgress = Callable[[str, float], None]
 """Receives a setting's title and the progress of its trial (0 to 1), some tens of times per second."""
 
 
-@dataclass
-class Trial:
-    """Result of a trial: attitudes and places (m; none without a position) as float64 parts (samples, 4 or
-    3), and the relative drift (samples,) of each invariant. ``work``, steps times order squared times states,
-    doesn't jitter.
+class Collected(SampleReceiver):
+    """A prepared scene taken through its samples, with what is recorded kept in memory.
+
+    Attributes:
+        progress: how it ended.
+        parts: of the assembly that took it there.
     """
 
-    setting: Setting
-    status: Status
-    attitudes: list[np.ndarray]
-    drifts: dict[str, float]
-    steps: int
-    order: int
-    cpu_seconds: float
-    work: float
-    rows: int = field(default=0)
-    histories: dict[str, np.ndarray] = field(default_factory=dict)
-    places: list[np.ndarray] = field(default_factory=list)
-
-
-class Collected(SampleReceiver):
-    """Keeps recorded variables in memory."""
-
-    def __init__(self, evaluator: Evaluator, names: Sequence[str]) -> None:
-        self._evaluator = evaluator
+    def __init__(
+        self, prepared: InitialValueProblem, names: Sequence[str], check: Check = lambda _: None
+    ) -> None:
+        self.parts: Assembly = assemble(prepared)
         self._pieces: dict[str, list[Sequence[np.ndarray]]] = {name: [] for name in names}
+        self.progress = sampler(prepared, self.parts, self, check).run()
 
     def take(self, block: SampleBlock) -> None:
         """See ``SampleReceiver``."""
-        recorded = self._evaluator.evaluate(block)
+        recorded = self.parts.evaluator.evaluate(block)
         for name, pieces in self._pieces.items():
             pieces.append(recorded[name])
 
-    def parts(self, name: str) -> list[np.ndarray]:
+    def __getitem__(self, name: str) -> list[np.ndarray]:
         """Float64 parts of a variable, its samples first."""
         found = [np.concatenate(part) for part in zip(*self._pieces[name], strict=True)]
         return [np.asarray(part, dtype=np.float64) for part in found]
+
+
+@dataclass
+class Trial:
+    """Result of a trial: attitudes and places (m; none without a position) as float64 parts (samples, 4 or
+    3), and the relative drift (samples,) of each invariant.
+    """
+
+    status: Status
+    attitudes: list[np.ndarray]
+    places: list[np.ndarray]
+    histories: dict[str, np.ndarray]
+    steps: int
+    order: int
+    states: int
+
+    @property
+    def drifts(self) -> dict[str, float]:
+        """Largest drift of each invariant."""
+        return {name: float(np.abs(drift).max(initial=0.0)) for name, drift in self.histories.items()}
+
+    @property
+    def work(self) -> float:
+        """Steps times order squared times states, which doesn't jitter as CPU time does."""
+        return float(self.steps) * self.order**2 * self.states
 
 
 def trial_scene(
@@ -101,7 +113,7 @@ def try_setting(
     times: Sequence[mpmath.mpf] | None = None,
     *,
     loads: Sequence[Load] = (),
-    go_on: Check | None = None,
+    go_on: Check = lambda _: None,
     told: TrialProgress | None = None,
     compact: bool = False,
     repeating: bool = False,
@@ -119,32 +131,26 @@ def try_setting(
     prepared = prepare_scene(experiment, scene, loads=loads, tolerance=setting.tolerance)
     if compact:
         prepared = compactly(prepared)
-    parts = assemble(prepared)
     invariants = [invariant.name for invariant in prepared.system.invariants]
     recorded = [r.name for r in prepared.system.recorded if r.name in ("quaternion", "position")]
-    receiver = Collected(parts.evaluator, [*recorded, *(f"{name}_drift" for name in invariants)])
-    check = go_on or (lambda _: None)
-    if told is not None:
-        told(setting.title, 0.0)
-        check = _telling(check, told, setting.title, float(scene.start), float(samples.last))
-    loop = sampler(prepared, parts, receiver, check)
-    built = time.process_time()
-    progress = loop.run()
-    ended = time.process_time()
-    order = parts.order or 0
-    histories = {x: drift.ravel() for x in invariants for drift in receiver.parts(f"{x}_drift")[:1]}
+    start, length, latest = float(scene.start), float(samples.last - scene.start), 0.0
+
+    def check(progress: Progress) -> Status | None:
+        nonlocal latest
+        if told is not None and time.monotonic() - latest > _TOLD_EVERY and length > 0:
+            latest = time.monotonic()
+            told(setting.title, min(1.0, (progress.time - start) / length))
+        return go_on(progress)
+
+    found = Collected(prepared, [*recorded, *(f"{name}_drift" for name in invariants)], check)
     return Trial(
-        setting=setting,
-        status=progress.status,
-        attitudes=[part[early:] for part in receiver.parts("quaternion")],
-        drifts={name: float(np.abs(drift).max(initial=0.0)) for name, drift in histories.items()},
-        steps=progress.steps,
-        order=order,
-        cpu_seconds=ended - built,
-        work=float(progress.steps) * order**2 * len(prepared.system.states),
-        rows=max(progress.next_sample - early, 0),
-        histories=histories,
-        places=[part[early:] for part in receiver.parts("position")] if "position" in recorded else [],
+        status=found.progress.status,
+        attitudes=[part[early:] for part in found["quaternion"]],
+        places=[part[early:] for part in found["position"]] if "position" in recorded else [],
+        histories={x: drift.ravel() for x in invariants for drift in found[f"{x}_drift"][:1]},
+        steps=found.progress.steps,
+        order=found.parts.order or 0,
+        states=len(prepared.system.states),
     )
 
 
@@ -168,8 +174,7 @@ class Trials:
                 made = try_setting(
                     self.experiment, setting, times, loads=self.loads, compact=True, told=self.told
                 )
-            done = made is not None and made.status is Status.FINISHED and made.rows == len(times)
-            self._made[key] = made if done else None
+            self._made[key] = made if made is not None and made.status is Status.FINISHED else None
         return self._made[key]
 
     def compare(self, setting: Setting, reference: Setting, times: Sequence[mpmath.mpf]) -> np.ndarray | None:
@@ -178,21 +183,6 @@ class Trials:
         """
         one, other = self.whole(setting, times), self.whole(reference, times)
         return None if one is None or other is None else angles_between(one.attitudes, other.attitudes)
-
-
-def _telling(check: Check, told: TrialProgress, title: str, start: float, last: float) -> Check:
-    """A check between chunks that also reports the progress of a trial."""
-    latest = time.monotonic()
-
-    def both(progress: Progress) -> Status | None:
-        nonlocal latest
-        now = time.monotonic()
-        if now - latest > _TOLD_EVERY and last > start:
-            latest = now
-            told(title, min(1.0, (progress.time - start) / (last - start)))
-        return check(progress)
-
-    return both
 
 
 def compactly(prepared: InitialValueProblem) -> InitialValueProblem:

@@ -23,7 +23,7 @@ from rigidsim.accuracy.bench.worker import Answer, Task, Worker
 from rigidsim.accuracy.comparison import angles_between
 from rigidsim.accuracy.error_law import closed_form_if_any
 from rigidsim.accuracy.motion import run_pilot
-from rigidsim.accuracy.reference import LEAST_DIGITS, exact_to
+from rigidsim.accuracy.reference import LEAST_DIGITS
 from rigidsim.accuracy.setting import Setting, cost, epsilon
 from rigidsim.accuracy.trial import Trial, trial_scene
 from rigidsim.errors import RigidsimError
@@ -95,7 +95,7 @@ class Plan:
     def references(self) -> list[Task]:
         """What to integrate as references: the closed form if there is one."""
         if self.exact:
-            return [self.task(exact_to(LEAST_DIGITS, self.exact).setting, wide=False)]
+            return [self.task(Setting(LEAST_DIGITS, method=self.exact), wide=False)]
         return [
             self.task(setting, wide=precision == LEAST_DIGITS)
             for precision in ("quadruple", LEAST_DIGITS)
@@ -195,7 +195,7 @@ def best_reference(
         return {setting: trial.attitudes for setting, trial in whole.items() if trial is not None}
 
     solutions = over(plan.times)
-    exact = exact_to(LEAST_DIGITS, plan.exact).setting if plan.exact else None
+    exact = Setting(LEAST_DIGITS, method=plan.exact) if plan.exact else None
     if exact is not None and exact in solutions:
         own = np.full(len(plan.times), 10.0 ** (2 - LEAST_DIGITS))  # two digits are left to rounding
         return ReferenceSolution(solutions[exact], own, f"closed form to {LEAST_DIGITS} digits"), None

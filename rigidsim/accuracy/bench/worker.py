@@ -8,7 +8,6 @@ are repeated until they can be told from noise. Recording costs the same in ever
 """
 
 import math
-import pickle
 import statistics
 import subprocess
 import sys
@@ -16,9 +15,9 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
-from io import BufferedReader
-from select import select
-from typing import IO, Self, cast
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from typing import Any, Self
 
 import mpmath
 import numpy as np
@@ -31,7 +30,6 @@ from rigidsim.solve.assembly import assemble
 from rigidsim.solve.closed_form import closed_form_of
 from rigidsim.solve.compiled import quieten_engine
 from rigidsim.solve.problem import prepare_scene
-from rigidsim.solve.sampler import Progress
 from rigidsim.solve.status import Status
 
 _SHORTEST_PASS = 4e-3  # CPU seconds: the clock's own resolution is a microsecond, a call's cost ten
@@ -47,7 +45,7 @@ class Task:
 
     setting: Setting
     times: tuple[float, ...]
-    patience: float = field(compare=False)
+    patience: float = field(default=math.inf, compare=False)
     speed_steps: int | None = None
 
 
@@ -60,80 +58,66 @@ class Answer:
     problem: str = ""
 
 
-def _attitudes(experiment: Experiment, task: Task) -> Answer:
-    started = time.process_time()
-
-    def go_on(_: Progress) -> Status | None:
-        return Status.WALL_TIME if time.process_time() - started > task.patience else None
-
-    trial = try_setting(experiment, task.setting, [mpmath.mpf(t) for t in task.times], go_on=go_on)
+def _attitudes(experiment: Experiment, task: Task, times: list[mpmath.mpf]) -> Answer:
+    until = time.process_time() + task.patience
+    go_on = lambda _: Status.WALL_TIME if time.process_time() > until else None  # noqa: E731
+    trial = try_setting(experiment, task.setting, times, go_on=go_on)
     if trial.status is Status.WALL_TIME:
         return Answer(trial, problem=f"took longer than {task.patience:.3g} s, its part of the budget")
     return Answer(trial, problem="" if trial.status is Status.FINISHED else trial.status.message)
 
 
-def _speed(experiment: Experiment, task: Task) -> Answer:
-    """CPU seconds per natural step, or per sample of a closed form: the median of several passes."""
+def _speed(experiment: Experiment, task: Task, times: list[mpmath.mpf]) -> Answer:
+    """CPU seconds per natural step, or per sample of a closed form: the median of several passes, which are
+    lengthened until they can be measured.
+    """
     most = task.speed_steps or 1
-    scene = trial_scene(experiment, task.setting, [mpmath.mpf(t) for t in task.times])
+    scene = trial_scene(experiment, task.setting, times)
     prepared = prepare_scene(experiment, scene, tolerance=task.setting.tolerance)
-    if not prepared.has_steps:
-        closed, system, precision = closed_form_of(scene), prepared.system, prepared.precision
-        rows = np.resize(prepared.clock.internal(0, prepared.clock.count), _CLOSED_ROWS[precision.narrow])
-        begin = prepared.clock.start
-
-        def one_pass(_: int) -> None:
-            closed.states(system, precision, rows, begin)
-
-        return Answer(seconds=_per_unit(one_pass, len(rows), len(rows), task.patience))
-    corrected = assemble(prepared).steps()
-    start = corrected.boundary()
-
-    def steps(count: int) -> None:
-        corrected.back_to(start)
-        corrected.skip(count)
-
-    steps(min(most, _LONGEST_WARMING))  # charts are compiled when first needed
-    return Answer(seconds=_per_unit(steps, min(32, most), most, task.patience))
-
-
-def _per_unit(one_pass: Callable[[int], None], count: int, most: int, patience: float) -> float:
-    """Median over passes of the seconds per unit; passes are lengthened until they can be measured."""
-    begun, passes = time.process_time(), []
-    while True:
+    one_pass: Callable[[int], Any]
+    if prepared.has_steps:
+        corrected = assemble(prepared).steps()
+        start = corrected.boundary()
+        one_pass = lambda steps: corrected.back_to(start) or corrected.skip(steps)  # noqa: E731
+        one_pass(min(most, _LONGEST_WARMING))  # charts are compiled when first needed
+        count = min(32, most)
+    else:
+        closed, clock, precision = closed_form_of(scene), prepared.clock, prepared.precision
+        rows = np.resize(clock.internal(0, clock.count), _CLOSED_ROWS[precision.narrow])
+        one_pass = lambda _: closed.states(prepared.system, precision, rows, clock.start)  # noqa: E731
+        count = most = len(rows)
+    begun, passes = time.process_time(), list[float]()
+    while not passes or time.process_time() - begun <= task.patience:
         started = time.process_time()
         one_pass(count)
-        ended = time.process_time()
-        spent = ended - started
-        if spent < _SHORTEST_PASS and count < most and ended - begun < patience:
+        spent = time.process_time() - started
+        if spent < _SHORTEST_PASS and count < most and time.process_time() - begun < task.patience:
             count = min(2 * count, most)
-            continue
-        passes.append(spent / count)
-        if ended - begun > patience:
-            return statistics.median(passes)
+        else:
+            passes.append(spent / count)
+    return Answer(seconds=statistics.median(passes))
 
 
-def work() -> None:
-    """Do the tasks that come on stdin, answering each on stdout."""
+def work(descriptor: int) -> None:
+    """Do the tasks that come over a connection, answering each."""
     quieten_engine()
-    given, answers = cast(BufferedReader, sys.stdin.buffer), sys.stdout.buffer
-    text, source = pickle.load(given)
+    tasks = Connection(descriptor)
+    text, source = tasks.recv()
     experiment = parse(text, source=source)
-    while given.peek(1):
-        task: Task = pickle.load(given)
+    while True:
         try:
-            found = (_attitudes if task.speed_steps is None else _speed)(experiment, task)
+            task: Task = tasks.recv()
+        except EOFError:
+            return
+        try:
+            do = _attitudes if task.speed_steps is None else _speed
+            found = do(experiment, task, [mpmath.mpf(t) for t in task.times])
         except ConfigError as error:
             found = Answer(problem="; ".join(map(str, error.problems)))
         except (RigidsimError, OverflowError, ZeroDivisionError, ValueError) as error:
             name = "" if isinstance(error, RigidsimError) else f"{type(error).__name__}: "
             found = Answer(problem=f"{name}{error}")
-        _send(answers, found)
-
-
-def _send(to: IO[bytes], what: object) -> None:
-    pickle.dump(what, to)
-    to.flush()
+        tasks.send(found)
 
 
 class Worker:
@@ -141,7 +125,7 @@ class Worker:
 
     def __init__(self, experiment: Experiment) -> None:
         self._experiment, self._stopped = experiment, False
-        self._child: subprocess.Popen[bytes] | None = None
+        self._child: tuple[subprocess.Popen[bytes], Connection] | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -150,31 +134,33 @@ class Worker:
         """Stop; what another thread waits for then has no answer."""
         self._stopped = True
         if self._child is not None:
-            self._child.kill()
+            self._child[0].kill()
 
     def answer(self, task: Task, until: float) -> Answer | None:
         """Its answer; None if that isn't there by a time (of ``time.monotonic``), or the worker was stopped.
         A task on which the process dies is answered with that.
         """
-        command = [sys.executable, "-c", "from rigidsim.accuracy.bench import worker; worker.work()"]
-        pipe, begun = subprocess.PIPE, self._child
-        child = self._child = begun or subprocess.Popen(command, stdin=pipe, stdout=pipe)
-        assert child.stdin is not None
-        assert child.stdout is not None
+        child, tasks = self._child = self._child or self._begun()
         late = False
-        with suppress(EOFError, OSError, pickle.UnpicklingError):  # it ended, perhaps within an answer
-            if begun is None:
-                _send(child.stdin, (self._experiment.text, self._experiment.source))
-            _send(child.stdin, task)
-            late = not select([child.stdout], [], [], max(0.0, until - time.monotonic()))[0]
+        with suppress(EOFError, OSError):  # it ended, perhaps within an answer
+            tasks.send(task)
+            late = not tasks.poll(max(0.0, until - time.monotonic()))
             if not late:
-                found: Answer = pickle.load(child.stdout)
+                found: Answer = tasks.recv()
                 return found
         self._child = None
         if late:
             child.kill()
-        with suppress(BrokenPipeError), child:  # closes its pipes, and waits
-            pass
+        tasks.close()
+        code = child.wait()
         if late or self._stopped:
             return None
-        return Answer(problem=f"the process that measured it ended with code {child.returncode}")
+        return Answer(problem=f"the process that measured it ended with code {code}")
+
+    def _begun(self) -> tuple[subprocess.Popen[bytes], Connection]:
+        ours, theirs = Pipe()
+        call = f"from rigidsim.accuracy.bench import worker; worker.work({theirs.fileno()})"
+        child = subprocess.Popen([sys.executable, "-c", call], pass_fds=[theirs.fileno()])
+        theirs.close()
+        ours.send((self._experiment.text, self._experiment.source))
+        return child, ours

@@ -9,18 +9,18 @@ carries errors alike, up to terms that averaging leaves out.
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from rigidsim.accuracy.models.side_by_side import Unmeasured
-from rigidsim.accuracy.trial import compactly
+from rigidsim.accuracy.models.side_by_side import Unmeasured, in_model
 from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.average import DIRECTION, Average
-from rigidsim.scene.choices import DEFAULT_METHOD, ORBIT_AVERAGED
+from rigidsim.scene.choices import ORBIT_AVERAGED
 from rigidsim.solve.precision import precision_of
-from rigidsim.solve.problem import InitialValueProblem, prepare_scene
+from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.tangents import Derivatives, LostTangents, Place, Tangents
 from rigidsim.store.summary_parts import UnmeasuredCode
 
@@ -116,26 +116,12 @@ def carrying(
 
 def _problem(prepared: InitialValueProblem, average: Average | None) -> InitialValueProblem:
     """The averaged motion that is followed: averaged over the orbits as well, if it can be."""
-    scene, config = prepared.scene, prepared.scene.config
-    plain: dict[str, object] = {"precision": "double", "tolerance": "auto"}
-    if average is None:  # what is of the full motion alone
-        plain |= {"formulation": "auto", "method": DEFAULT_METHOD, "hold_invariants": False}
-        plain |= {"accuracy": None, "accuracy_position": None}
-    integrator = config.integrator.model_copy(update=plain)
-    output = config.output.model_copy(update={"record": ["momentum_axis"], "lyapunov": False})
-    own_level = ORBIT_AVERAGED if average is None else average.level
-    for level in dict.fromkeys((ORBIT_AVERAGED, own_level)):
-        model = config.model.model_copy(update={"level": level, "short_period": False})
-        tables = {"model": model, "integrator": integrator, "output": output, "events": []}
-        found = replace(scene, config=config.model_copy(update=tables), events=())
-        loads = prepared.python_loads
-        own = average if level == own_level else None
-        try:
-            return compactly(prepare_scene(prepared.experiment, found, loads=loads, along=own))
-        except ConfigError:
-            if level == own_level:
-                raise
-    raise AssertionError
+    scene, names = prepared.scene, ["momentum_axis"]
+    if average is not None and not average.over_orbits:
+        with suppress(ConfigError):
+            return in_model(prepared, scene, names, ORBIT_AVERAGED, None)
+        return in_model(prepared, scene, names, average.level, average)
+    return in_model(prepared, scene, names, ORBIT_AVERAGED, average)
 
 
 def _basis(direction: np.ndarray, towards: np.ndarray, otherwise: np.ndarray | None = None) -> np.ndarray:

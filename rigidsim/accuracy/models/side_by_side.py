@@ -19,9 +19,7 @@ from rigidsim.scene.choices import FULL
 from rigidsim.scene.exact import fraction_of
 from rigidsim.scene.sample_times import SampleTimes
 from rigidsim.scene.scene import Scene
-from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.problem import InitialValueProblem, prepare_scene
-from rigidsim.solve.sampler import Progress
 from rigidsim.solve.status import Status
 from rigidsim.store.summary_parts import ModellingWindow, UnmeasuredCode
 
@@ -218,36 +216,39 @@ def _followed(
     go_on: Callable[[], bool],
 ) -> tuple[int, dict[str, np.ndarray]]:
     """Steps, and the variables asked for at all samples. Raises ``Unmeasured``."""
-    config = scene.config
     level = FULL if average is None else average.level
-    model = config.model.model_copy(update={"level": level, "short_period": short_period})
-    plain = {"precision": "double", "tolerance": "auto", "hold_invariants": False}
-    integrator = config.integrator.model_copy(update=plain)
-    output = config.output.model_copy(update={"record": names, "lyapunov": False, "timeline": False})
-    changed = config.model_copy(update={"model": model, "integrator": integrator, "output": output})
     words = f'level = "{level}" from {float(scene.start):.6g} s on'
-    loads = prepared.python_loads
     try:
         # what the run averages over is known: a window that decided anew might decide otherwise
-        begun = prepare_scene(prepared.experiment, replace(scene, config=changed), loads=loads, along=average)
+        problem = in_model(prepared, scene, names, level, average, short_period=short_period)
     except ConfigError as error:
         code = UnmeasuredCode.FULL_REFUSED if average is None else UnmeasuredCode.AVERAGED_REFUSED
         why = "; ".join(problem.what for problem in error.problems)
         raise Unmeasured(code, f"{words} can't be followed: {why}") from None
-    problem = compactly(begun)
-    parts = assemble(problem)
-    receiver = Collected(parts.evaluator, names)
-
-    def check(_: Progress) -> Status | None:
-        return None if go_on() else Status.INTERRUPTED
-
-    progress = sampler(problem, parts, receiver, check).run()
+    found = Collected(problem, names, lambda _: None if go_on() else Status.INTERRUPTED)
+    progress = found.progress
     if progress.status is Status.INTERRUPTED:
         raise Unmeasured(UnmeasuredCode.INTERRUPTED, "the measurement was interrupted")
     if progress.status is not Status.FINISHED:
         code = UnmeasuredCode.FULL_STOPPED if average is None else UnmeasuredCode.AVERAGED_STOPPED
         raise Unmeasured(code, f"{words} ended early: {progress.status.message}")
-    return progress.steps, {name: receiver.parts(name)[0] for name in names}
+    return progress.steps, {name: found[name][0] for name in names}
+
+
+def in_model(
+    prepared: InitialValueProblem,
+    scene: Scene,
+    names: list[str],
+    level: str,
+    average: Average | None,
+    *,
+    short_period: bool = False,
+) -> InitialValueProblem:
+    """A scene's motion in a model of some level, in double precision; ``average`` if it is known already."""
+    config = scene.config.as_motion(names, precision="double", tolerance="auto", formulation="auto")
+    model = config.model.model_copy(update={"level": level, "short_period": short_period})
+    plain = replace(scene, config=config.model_copy(update={"model": model}), events=())
+    return compactly(prepare_scene(prepared.experiment, plain, loads=prepared.python_loads, along=average))
 
 
 def _basis(path: np.ndarray) -> np.ndarray:
