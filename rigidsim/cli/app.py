@@ -193,6 +193,7 @@ def compare(
     file: options.TrajectoryPath,
     overrides: options.SetOption = None,
     within: options.WithinOption = 1e-9,
+    convention: options.ConventionOption = None,
     out: options.ComparisonOption = None,
     figure: options.ComparedFigureOption = None,
     timeline: options.ComparedTimelineOption = None,

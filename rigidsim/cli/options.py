@@ -159,6 +159,10 @@ ComparisonOption = Annotated[
     Path | None, _option("--out", "FILE", "Dataset of what was found along time, such as comparison.h5.")
 ]
 ComparedFigureOption = Annotated[Path | None, _option("--figure", "FILE", "Figure, a .png or a .svg.")]
+ConventionOption = Annotated[
+    str | None,
+    _option("--convention", "KEY=VALUE,...", "What is known of it, as order=xyzw,rate_axes=space."),
+]
 KernelsOption = Annotated[
     list[Path] | None,
     _option("--kernels", "FILE", "Clock (SCLK) and leap seconds that a CK is read with; repeatable."),

@@ -10,7 +10,6 @@ import numpy as np
 
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.readable import ANGLE_UNITS, AngleUnit
-from rigidsim.store.many_rows import largest, picked
 
 FEW = 9
 """Different numbers of one matrix, whose digits say nothing of a format."""
@@ -110,11 +109,11 @@ def written_resolution(values: np.ndarray, narrow: bool, few: int = 0) -> float:
     that of single precision where all are such numbers. Up to ``few`` different numbers, as of a body at
     rest, are taken for exact.
     """
-    most = largest(values)
+    most = float(np.abs(values).max())
     if narrow:
         return most * _SINGLE
     places = np.linspace(0, values.size - 1, min(values.size, 300)).astype(int)
-    some = picked(values.reshape(-1), places)
+    some = values.reshape(-1)[places]
     if len(np.unique(some)) <= few:
         return most * 2.0**-53
     written = [Decimal(repr(value)).normalize().as_tuple() for value in some.tolist()]

@@ -1,7 +1,6 @@
 """What other tools wrote, as named columns of doubles: text, Parquet, netCDF and CCSDS messages.
 
-Nothing is known here of what the columns mean, nor is anything left out, sorted or filled in. Files are read
-by blocks of rows, so that memory doesn't grow with them.
+Nothing is known here of what the columns mean, nor is anything left out, sorted or filled in.
 """
 
 from __future__ import annotations
@@ -23,8 +22,8 @@ from rigidsim.scene.epochs import Epoch, parse_epoch
 from rigidsim.scene.row_rotations import conjugated, multiplied, turned
 from rigidsim.scene.space_axes import ECLIPTIC, SpaceAxes, from_equator
 from rigidsim.scene.text_tables import TableError, TextTable, holds_times, is_date, name_and_unit, open_table
+from rigidsim.scene.units import is_unit
 from rigidsim.scene.validation_messages import nearest
-from rigidsim.store.many_rows import BLOCK, blocks_of, gathered
 
 if TYPE_CHECKING:
     import pandas
@@ -39,7 +38,7 @@ TEXT = {".csv", ".txt", ".dat", ".tsv"}
 """Endings of the names of text files."""
 _XARRAY = {".nc", ".nc4", ".cdf", ".h5", ".hdf5", ".zarr"}
 _MOST_COLUMNS = 500
-_BUFFER = 2**20  # bytes of a Parquet file's column that are read at once
+_BLOCK = 65_536  # rows of a text that are held as words
 
 
 @dataclass(frozen=True)
@@ -109,8 +108,13 @@ class Trajectory:
         return any(name in (one, name_and_unit(one)[0]) for one in self.names)
 
     def unit(self, name: str) -> str | None:
-        """The unit of a column, as far as the file or the column's name says it."""
-        return self.units.get(self.named(name))
+        """The unit of a column as configs write it, as far as the file or the column's name says it."""
+        name = self.named(name)
+        unit = self.units.get(name) or name_and_unit(name)[1]
+        if unit is None or unit == "rad s-1":
+            return unit and "rad/s"
+        unit = re.sub(r"(?<=[A-Za-z])(-?\d)", r"^\1", unit)  # of a dataset: kg m2 s-1
+        return unit if is_unit(unit) or holds_times(name) else None
 
     def column(self, name: str) -> np.ndarray:
         """Numbers of a column, (rows,) float64.
@@ -269,18 +273,13 @@ def _made(
     sizes = {len(value) for value in kept}
     if len(sizes) > 1:
         raise RigidsimError(f"{source}: columns of different lengths ({sorted(sizes)[:5]}); give equal ones")
-    blocks = (
-        np.column_stack([np.asarray(value[rows]).reshape(rows.stop - rows.start, -1) for value in kept])
-        for rows in blocks_of(max(sizes, default=0))
-    )
+    columns = [np.asarray(value).reshape(len(value), -1).astype(np.float64) for value in kept]
+    table = np.concatenate(columns, axis=1) if columns else np.empty((0, 0))
     narrow = any(value.dtype == np.float32 for value in kept)
-    return Trajectory(_columns(names, blocks), source, units or {}, narrow=narrow, left_out=tuple(left_out))
+    return Trajectory(_columns(names, table), source, units or {}, narrow=narrow, left_out=tuple(left_out))
 
 
-def _columns(names: Sequence[str], blocks: Iterable[np.ndarray]) -> dict[str, np.ndarray]:
-    """Columns of a table that comes in blocks (rows, columns)."""
-    empty = np.empty((0, len(names)))
-    table = gathered(itertools.chain([empty], (block.astype(np.float64, copy=False) for block in blocks)))
+def _columns(names: Sequence[str], table: np.ndarray) -> dict[str, np.ndarray]:
     return {name: table[:, n] for n, name in enumerate(names)}
 
 
@@ -323,38 +322,31 @@ def _of_parquet(path: Path) -> Trajectory:
     if importlib.util.find_spec("pyarrow") is None:
         raise RigidsimError(f'{path}: needs pyarrow, which is missing: pip install "rigidsim[export]"')
     from pyarrow import types
-    from pyarrow.parquet import ParquetFile
+    from pyarrow.parquet import read_table
 
-    with ParquetFile(path, buffer_size=_BUFFER, pre_buffer=False) as file:
-        numbers = [x for x in file.schema_arrow if types.is_integer(x.type) or types.is_floating(x.type)]
-        names = [column.name for column in numbers]
-        blocks = (
-            np.column_stack([column.to_numpy(zero_copy_only=False) for column in batch.columns])
-            for batch in file.iter_batches(BLOCK, columns=names, use_threads=False)
-        )
-        narrow = any(types.is_float32(column.type) for column in numbers)
-        left_out = tuple(name for name in file.schema_arrow.names if name not in names)
-        columns = _columns(names, blocks) if names else {}
-        return Trajectory(columns, str(path), narrow=narrow, left_out=left_out)
+    table = read_table(path)
+    numbers = [x for x in table.schema if types.is_integer(x.type) or types.is_floating(x.type)]
+    found = {x.name: table[x.name].to_numpy().astype(np.float64) for x in numbers}
+    narrow = any(types.is_float32(column.type) for column in numbers)
+    left_out = tuple(name for name in table.schema.names if name not in found)
+    return Trajectory(found, str(path), narrow=narrow, left_out=left_out)
 
 
 def _of_text(path: Path) -> Trajectory:
     table = open_table(partial(_lines, path))
     lines: list[int] = []
 
-    def blocks() -> Iterator[np.ndarray]:
-        rows = table.rows()
-        while block := list(itertools.islice(rows, BLOCK)):
-            lines.extend(number for number, _ in block)
-            try:
-                yield np.array([[float(cell) for cell in cells] for _, cells in block])
-            except ValueError:
-                yield np.array([list(map(table.number, cells)) for _, cells in block])
-
-    found = _columns(table.names, blocks())
+    rows, blocks = table.rows(), []
+    while block := list(itertools.islice(rows, _BLOCK)):
+        lines.extend(number for number, _ in block)
+        try:
+            blocks.append(np.array([[float(cell) for cell in cells] for _, cells in block]))
+        except ValueError:
+            blocks.append(np.array([list(map(table.number, cells)) for _, cells in block]))
     if not lines:
         raise TableError("no rows; a line of names and rows of values are needed")
-    kept = {name: values for name, values in found.items() if _any_number(values)}
+    found = _columns(table.names, np.concatenate(blocks))
+    kept = {name: values for name, values in found.items() if np.isfinite(values).any()}
     left_out = tuple(name for name in found if name not in kept)
     in_turn = lines[-1] - lines[0] == len(lines) - 1
     return Trajectory(
@@ -366,7 +358,3 @@ def _of_text(path: Path) -> Trajectory:
 def _lines(path: Path) -> Iterator[str]:
     with path.open(encoding="utf-8-sig") as file:
         yield from file
-
-
-def _any_number(values: np.ndarray) -> bool:
-    return any(np.isfinite(values[rows]).any() for rows in blocks_of(len(values)))

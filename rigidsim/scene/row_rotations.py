@@ -11,8 +11,9 @@ SEQUENCES = ("zxz", "zyz", "xyx", "xzx", "yxy", "yzy", "zyx", "xyz", "xzy", "yxz
 
 
 def multiplied(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Hamilton products of rows; either may be a single quaternion (4,)."""
-    return np.stack(np.broadcast_arrays(*product(list(one.T), list(other.T))), axis=-1)
+    """Hamilton products of quaternions (..., 4), of which one may have fewer axes."""
+    parts = product(list(np.moveaxis(one, -1, 0)), list(np.moveaxis(other, -1, 0)))
+    return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
 
 def conjugated(quaternions: np.ndarray) -> np.ndarray:

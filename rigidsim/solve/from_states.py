@@ -23,7 +23,6 @@ from rigidsim.model.system import System
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.compiled import compiled_engine, compiled_function, evaluate_rows
 from rigidsim.solve.precision import Precision, precision_of
-from rigidsim.store.many_rows import blocks_of, gathered, picked
 
 _STEPS = 100_000
 
@@ -101,23 +100,15 @@ class FromStates(AnyStart):
 
     def motion(self, times: np.ndarray) -> np.ndarray:
         """The scene's own states (rows, states), internal units, at ascending times (s)."""
-        engine = self._engine
+        engine, grid = self._engine, self._internal(times)
         engine.time = self._start
         engine.state[:] = self.precision.array(self._system.initial)
-        first = self._internal(times[:1])
-        if first[0] != self._start:
-            self._advanced(first)
-        return gathered(self._advanced(self._internal(times[rows])) for rows in blocks_of(len(times)))
-
-    def _advanced(self, times: np.ndarray) -> np.ndarray:
-        """Go on to ascending times: the states there."""
-        engine = self._engine
-        grid = times if times[0] == engine.time else np.append(engine.time, times)
-        result = engine.propagate_grid(grid, max_steps=10**9)
+        begun = grid if grid[0] == self._start else np.append(self._start, grid)
+        result = engine.propagate_grid(begun, max_steps=10**9)
         states = np.asarray(result[5] if len(result) > 5 else result[-1])
-        if result[0] != hy.taylor_outcome.time_limit or len(states) != len(grid):
+        if result[0] != hy.taylor_outcome.time_limit or len(states) != len(begun):
             raise NotFromStates("its motion ends before the trajectory does")
-        return states[len(grid) - len(times) :]
+        return states[len(begun) - len(grid) :]
 
     def states(
         self, own: np.ndarray, quaternions: np.ndarray, rates: np.ndarray, flight: np.ndarray | None = None
@@ -190,10 +181,7 @@ class FromStates(AnyStart):
         begun = evaluate_rows(value, states[slice(1)], times=self._internal(times[:1]))[:, 0]
         expressions = drift_outputs(invariants, self._system.scene.context, self.precision.number)
         function = compiled_function(expressions, self._system.variables, **self._options)
-        found = gathered(
-            evaluate_rows(function, states[rows], begun, self._internal(times[rows])).T
-            for rows in blocks_of(len(times))
-        )
+        found = evaluate_rows(function, states[slice(None)], begun, self._internal(times)).T
         return {invariant.name: found[:, n] for n, invariant in enumerate(invariants)}
 
 
@@ -214,10 +202,5 @@ class RowStates:
     flight: np.ndarray | None
 
     def __getitem__(self, rows: int | slice | np.ndarray) -> np.ndarray:
-        if isinstance(rows, np.ndarray):
-            own, quaternions, rates = (picked(x, rows) for x in (self.own, self.quaternions, self.rates))
-            flight = None if self.flight is None else picked(self.flight, rows)
-        else:
-            own, quaternions, rates = self.own[rows], self.quaternions[rows], self.rates[rows]
-            flight = None if self.flight is None else self.flight[rows]
-        return self.equations.states(own, quaternions, rates, flight)
+        flight = None if self.flight is None else self.flight[rows]
+        return self.equations.states(self.own[rows], self.quaternions[rows], self.rates[rows], flight)

@@ -1,6 +1,7 @@
 """The command ``compare``."""
 
 from pathlib import Path
+from typing import Any
 
 from rigidsim.cli.screens.compare import print_comparison
 from rigidsim.cli.screens.page import answer
@@ -9,13 +10,16 @@ from rigidsim.workflows.read import load
 
 
 def compare(
-    config: Path, file: Path, overrides: list[str] | None, within: float, out: Path | None,
-    figure: Path | None, timeline: Path | None, kernels: list[Path] | None, force: bool, as_json: bool,
-) -> None:  # fmt: skip
-    """Judge another tool's trajectory."""
+    config: Path,
+    file: Path,
+    overrides: list[str] | None,
+    convention: str | None,
+    kernels: list[Path] | None,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Judge another tool's trajectory; options are those of ``rigidsim.compare``."""
     given = load(config, overrides=overrides or [])
-    found = compared(
-        given, file, within=within, out=out, figure=figure, timeline=timeline, kernels=kernels or (),
-        force=force,
-    )  # fmt: skip
+    asked = dict(part.strip().partition("=")[::2] for part in (convention or "").split(",") if part.strip())
+    found = compared(given, file, convention=asked, kernels=kernels or (), **options)
     answer(as_json, found.as_dict(), print_comparison, found)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.scene.readable import span_text
-from rigidsim.workflows.compare.result import AGREES, UNDECIDED, Comparison, FoundConvention
+from rigidsim.workflows.compare.result import AGREES, UNDECIDED, Comparison
 
 _MOST_UNDECIDED = 6
 
@@ -21,7 +19,7 @@ def print_comparison(found: Comparison) -> None:
     good = found.verdict in (AGREES, UNDECIDED)
     on.line("verdict", found.verdict, "bold" if good else "bold yellow")
     on.line("", found.why)
-    on.line("written", _convention(found.convention))
+    on.line("written", f"{found.convention}, time in {found.convention.time_unit}")
     undecided = found.convention.undecided
     if undecided:
         more = f", and {len(undecided) - _MOST_UNDECIDED} more" if len(undecided) > _MOST_UNDECIDED else ""
@@ -82,23 +80,6 @@ def print_comparison(found: Comparison) -> None:
     ):
         if name:
             on.line(label, name)
-
-
-def _convention(found: FoundConvention) -> str:
-    words = []
-    if found.sequence:
-        words.append(f"Euler angles {found.sequence} about {found.about} axes in {found.unit}")
-    elif found.order:
-        words.append(f"quaternion in columns {', '.join(found.order)}")
-    else:
-        words.append("rotation matrix")
-    words.append(found.direction.replace("_", " "))
-    if found.rate_unit:
-        words.append(f"rates along {found.rate_axes} axes in {found.rate_unit}")
-    words.append(f"time in {found.time_unit}")
-    if found.offset != "none":
-        words.append(f"{found.offset} axes turned by {math.degrees(found.offset_angle):.6g} deg")
-    return ", ".join(words)
 
 
 def _angle(angle: float) -> str:

@@ -7,7 +7,7 @@ names or matrices say by themselves is taken; the rest is refused, and ``compare
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
@@ -21,9 +21,13 @@ from rigidsim.formats.trajectories import Trajectory, is_trajectory, read_trajec
 from rigidsim.scene.scene import Scene
 from rigidsim.store.run import Run, SavedRun, open_run
 from rigidsim.store.summary import Brief
-from rigidsim.workflows.compare.columns import Attitudes, attitudes_of, seconds_in
-from rigidsim.workflows.compare.conventions import NONE, FoundReading, RateReading, Reading
-from rigidsim.workflows.compare.kinematics import turning_readings
+from rigidsim.workflows.compare.columns import ANGLES, QUATERNION, Attitudes, attitudes_of
+from rigidsim.workflows.compare.conventions import (
+    Convention,
+    attitude_conventions,
+    find_convention,
+    rate_conventions,
+)
 
 _AXES = {"body_axis": list("xyz"), "space_axis": list("XYZ"), "quaternion_component": list("wxyz")}
 
@@ -109,87 +113,58 @@ def run_dataset(path: Path) -> xarray.Dataset:
     """The dataset of a trajectory's file.
 
     Raises:
-        RigidsimError: the file can't be used, or its convention can't be told.
+        RigidsimError: the file can't be used, or its convention can't be found.
     """
     trajectory = read_trajectory(path)
     epoch = trajectory.epochs[0] if trajectory.epochs else None
     given = attitudes_of(trajectory, epoch)
-    second = seconds_in(given.time_unit or "s")
-    times = given.times * second
-    reading, rates, told = _read(given, second)
-    found = FoundReading(reading, NONE, 0.0, [])
+    told = list(given.told)
+    if given.time_unit is None:
+        told.append("times were taken for s; name a unit: t [day]")
+    if given.rates is None and (given.kind == ANGLES or (given.kind == QUATERNION and not given.order)):
+        raise RigidsimError(
+            f"{path}: without angular velocities its convention can't be determined; name a quaternion "
+            "qw qx qy qz, add wx wy wz, or let rigidsim compare CONFIG FILE --timeline find it"
+        )
+    if trajectory.settled:
+        told.append("attitude and rates were taken between the frames that the file names")
+        found = attitude_conventions(given)[0]
+        found = found if given.rates is None else replace(found, **rate_conventions(given)[0])
+    elif given.rates is None:
+        told.append("the attitude was taken from body axes to space axes")
+        found = attitude_conventions(given)[0]
+    else:
+        found, _ = find_convention(given, {})
+        told.append(f"taken as {found}: it turns at these")
+        if found.undecided:
+            others = len(found.undecided)
+            told.append(
+                f"{others} other conventions would fit as well; compare with an experiment can decide"
+            )
     dated = {"epoch": str(epoch)} if epoch is not None else {}
-    attributes = {"title": path.stem, "comment": "; ".join(told), **dated}
-    return dataset_of_rows(given, times, found, rates, attributes)
+    return dataset_of_rows(given, found, {"title": path.stem, "comment": "; ".join(told), **dated})
 
 
-def dataset_of_rows(
-    given: Attitudes, times: np.ndarray, found: FoundReading, rates: RateReading | None,
-    attributes: Mapping[str, Any],
-) -> xarray.Dataset:  # fmt: skip
-    """A trajectory, read in a convention, as the dataset of a run.
-
-    Args:
-        times: (rows,), s; earlier rows than the file's are left out where they are fewer.
-    """
-    count = len(times)
-    quaternions = found.quaternions(given)[:count]
+def dataset_of_rows(given: Attitudes, found: Convention, attributes: Mapping[str, Any]) -> xarray.Dataset:
+    """A trajectory, read in a convention, as the dataset of a run."""
+    quaternions = found.quaternions(given)
     jumps = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0  # of the sign, which means nothing
     quaternions = quaternions * np.cumprod(np.concatenate([[1.0], np.where(jumps, -1.0, 1.0)]))[:, None]
+    rates = None if given.rates is None else found.rates(given.rates, quaternions)
     made: dict[str, Any] = {
-        "quaternion": _variable(
-            quaternions, "quaternion_component", "1", "attitude quaternion, body to space"
+        name: (("time", dim), values, {"units": unit, "long_name": words})
+        for name, values, dim, unit, words in (
+            ("quaternion", quaternions, "quaternion_component", "1", "attitude quaternion, body to space"),
+            ("angular_velocity", rates, "body_axis", "rad s-1", "angular velocity"),
+            ("position", given.positions, "space_axis", "m", "position"),
+            ("velocity", given.velocities, "space_axis", "m s-1", "velocity"),
         )
+        if values is not None
     }
-    if rates is not None and given.rates is not None:
-        turning = rates.rates(given.rates[:count], found, quaternions)
-        made["angular_velocity"] = _variable(turning, "body_axis", "rad s-1", "angular velocity")
-    for name, values, unit in (("position", given.positions, "m"), ("velocity", given.velocities, "m s-1")):
-        if values is not None:
-            made[name] = _variable(values[:count], "space_axis", unit, name)
     for name, values in given.trajectory.columns.items():
-        if name not in made:
-            made[name] = ("time", values[:count], {"units": given.trajectory.units.get(name, "")})
+        made.setdefault(name, ("time", values, {"units": given.trajectory.units.get(name, "")}))
     used = {dim for dims, *_ in made.values() for dim in np.atleast_1d(dims)}
-    coordinates: dict[str, Any] = {"time": ("time", times, {"units": "s", "long_name": "time"})}
+    coordinates: dict[str, Any] = {"time": ("time", given.times, {"units": "s", "long_name": "time"})}
     coordinates |= {dim: labels for dim, labels in _AXES.items() if dim in used}
     source = f"a file of another tool: {given.trajectory.source}"
     return xarray.Dataset(made, coordinates, {"source": source, **attributes})
-
-
-def _variable(values: np.ndarray, dim: str, unit: str, name: str) -> Any:
-    return ("time", dim), values, {"units": unit, "long_name": name}
-
-
-def _read(given: Attitudes, second: float) -> tuple[Reading, RateReading | None, list[str]]:
-    """Readings of attitude and rates, and what a user should know of them."""
-    source, told = given.trajectory.source, list(given.told)
-    if given.trajectory.settled:
-        return (
-            Reading("wxyz"),
-            RateReading("deg/s", "body"),
-            [*told, "attitude and rates were taken between the frames that the file names"],
-        )
-    if given.time_unit is None:
-        told.append("times were taken for s; name a unit: t [day]")
-    if given.rates is None:
-        if given.angles is not None or not (given.named or given.matrices is not None):
-            raise RigidsimError(
-                f"{source}: without angular velocities its convention can't be determined; name a quaternion "
-                "qw qx qy qz, add wx wy wz, or let rigidsim compare CONFIG FILE --timeline find it"
-            )
-        told.append("the attitude was taken from body axes to space axes")
-        return Reading(order="wxyz" if given.named else ""), None, told
-    near = turning_readings(given, second)
-    if not near:
-        raise RigidsimError(
-            f"{source}: in no convention tried does its attitude turn at its rates, or its rows are too far "
-            "apart; rigidsim compare CONFIG FILE --timeline finds the convention with an experiment"
-        )
-    reading, rates = near[0].reading, near[0].rates
-    told.append(f"taken as {reading}, rates along {rates.axes} axes in {rates.unit}: it turns at these")
-    if len(near) > 1:
-        told.append(
-            f"{len(near) - 1} other conventions would fit as well; compare with an experiment can decide"
-        )
-    return reading, rates, told

@@ -17,8 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rigidsim.scene.row_rotations import conjugated, multiplied, normalised, turned, vector_of
-from rigidsim.solve.from_states import FromStates, RowStates
-from rigidsim.store.many_rows import picked
+from rigidsim.solve.from_states import RowStates
 
 _STEP = 0.15  # rad of turning in a step of the classical Runge-Kutta method, which gives derivatives alone
 _SMALL = 1e-5  # relative step of derivatives
@@ -51,9 +50,8 @@ class WindowsOfAttitudes:
         acceleration: added, rms over the windows' first rows, rad/s^2.
     """
 
-    equations: FromStates
-    times: np.ndarray
     states: RowStates
+    times: np.ndarray
     rows: np.ndarray
     rate: float
     rates: np.ndarray = field(init=False)
@@ -62,10 +60,8 @@ class WindowsOfAttitudes:
     acceleration: float = field(init=False, default=float("nan"))
 
     def __post_init__(self) -> None:
-        count, parts = self.rows.shape
-        flat = self.rows.ravel()
-        self._at = picked(self.times, flat).reshape(count, parts)
-        self._seen = picked(self.states.quaternions, flat).reshape(count, parts, 4)
+        self._at = self.times[self.rows]
+        self._seen = self.states.quaternions[self.rows]
         self._own = self.states[self.rows[:, 0]]
         first = vector_of(multiplied(conjugated(self._seen[:, 0]), self._seen[:, 1]))
         self.rates = first / (self._at[:, 1] - self._at[:, 0])[:, None]
@@ -128,16 +124,16 @@ class WindowsOfAttitudes:
                 break
         free = left.size * max(1 - rank / available, 1 / available)
         self.unexplained = float(np.sqrt(np.sum(left**2) / free))
-        states = self.equations.states(self._own, self._seen[:, 0], self.rates)
+        states = self.states.equations.states(self._own, self._seen[:, 0], self.rates)
         more = self._added(states, self._at[:, 0], change[None])
         self.acceleration = float(np.sqrt(np.mean(np.sum(more**2, axis=1))))
         self.rates = start
 
     def _added(self, states: np.ndarray, times: np.ndarray, changes: np.ndarray) -> np.ndarray:
         """Accelerations (rows, 3), rad/s^2, body axes, that changes (lanes, numbers) of the equations add."""
-        lanes, inertia = len(changes), self.equations.inertia
-        quaternions, rates = self.equations.attitude(states)
-        own = self.equations.accelerations(states, times).reshape(lanes, -1, 3)
+        lanes, inertia = len(changes), self.states.equations.inertia
+        quaternions, rates = self.states.equations.attitude(states)
+        own = self.states.equations.accelerations(states, times).reshape(lanes, -1, 3)
         w = rates.reshape(lanes, -1, 3)
         torque = own @ inertia + np.cross(w, w @ inertia)
         other = inertia + np.einsum("lk,kij->lij", changes[:, :6], _SYMMETRIC) * np.trace(inertia) / 3
@@ -160,11 +156,11 @@ class WindowsOfAttitudes:
         (lanes, numbers), by steps.
         """
         lanes, count = rates.shape[:2]
-        states = np.concatenate([self.equations.states(self._own, self._seen[:, 0], w) for w in rates])
+        states = np.concatenate([self.states.equations.states(self._own, self._seen[:, 0], w) for w in rates])
 
         def slopes(at: np.ndarray, now: np.ndarray) -> np.ndarray:
             more = self._added(now, at, changes) if changes.any() else None
-            return self.equations.slopes(now, at, more)
+            return self.states.equations.slopes(now, at, more)
 
         found = []
         for part in range(1, parts or self._at.shape[1]):
@@ -178,20 +174,20 @@ class WindowsOfAttitudes:
                 c = slopes(t + h / 2, states + half * b)
                 d = slopes(t + h, states + h[:, None] * c)
                 states = states + h[:, None] / 6 * (a + 2 * b + 2 * c + d)
-            found.append(normalised(self.equations.attitude(states)[0]).reshape(lanes, count, 4))
+            found.append(normalised(self.states.equations.attitude(states)[0]).reshape(lanes, count, 4))
         return np.stack(found, axis=2)
 
     def _missed(self, change: np.ndarray) -> np.ndarray:
         """What is missed (windows, numbers), rad, with a change (numbers,) of the equations."""
-        begun = self.equations.states(self._own, self._seen[:, 0], self.rates)
+        begun = self.states.equations.states(self._own, self._seen[:, 0], self.rates)
         reached = np.stack([
-            normalised(self.equations.attitude(self.equations.after(state, at[0], at[1:]))[0])
+            normalised(self.states.equations.attitude(self.states.equations.after(state, at[0], at[1:]))[0])
             for state, at in zip(begun, self._at, strict=True)
         ])  # fmt: skip
         if change.any():
             both = self._paths(np.stack([self.rates, self.rates]), np.stack([0 * change, change]))
-            reached = multiplied_each(reached, multiplied_each(conjugated(both[0]), both[1]))
-        missed = vector_of(multiplied_each(conjugated(reached), self._seen[:, 1:]))
+            reached = multiplied(reached, multiplied(conjugated(both[0]), both[1]))
+        missed = vector_of(multiplied(conjugated(reached), self._seen[:, 1:]))
         return np.asarray(missed.reshape(len(missed), -1))
 
     def _derivatives(self, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -205,15 +201,9 @@ class WindowsOfAttitudes:
             rates[1 + n, :, n] += _SMALL * self.rate
         changes[range(4, lanes), range(lanes - 4)] += _SMALL
         paths = self._paths(rates, changes)
-        turns = vector_of(multiplied_each(conjugated(paths[:1]), paths[1:]))
+        turns = vector_of(multiplied(conjugated(paths[:1]), paths[1:]))
         found = np.moveaxis(turns, 0, -1).reshape(len(self.rates), -1, lanes - 1) / _SMALL
         return found[..., :3] / self.rate, found[..., 3:]
-
-
-def multiplied_each(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Hamilton products of quaternions (..., 4)."""
-    one, other = np.broadcast_arrays(one, other)
-    return multiplied(one.reshape(-1, 4), other.reshape(-1, 4)).reshape(one.shape)
 
 
 def _solved(table: np.ndarray, goal: np.ndarray) -> np.ndarray:

@@ -1,18 +1,22 @@
-"""The convention that a trajectory is written in: the reading nearest to the experiment.
+"""The convention that a trajectory is written in, found by trying all.
 
-Mismatches are averaged as logarithms, over rows that lie closer together near the beginning: the right
-reading is near there even if the motion is another one later, and wrong readings are of the order of a
-radian at nearly all rows. Of readings that are equally near the plainest one is taken, and the others are
-named, since this motion can't tell them apart.
+A candidate is judged by three mismatches: of its attitudes with the experiment's, of their turning with its
+rates, and of its rates with the experiment's. One after the other keeps the candidates that are about as good
+as the best; the plainest of the rest is taken, and the others are listed, since this motion can't separate
+them. Mismatches are averaged as logarithms, over rows that lie closer together near the beginning: the right
+candidate is near there even if the motion is another one later. From a row to the next an attitude turns by
+the mean of the rates at both, up to (rate x interval)^2 / 12 of it, whatever acts on the body.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
+from rigidsim.errors import RigidsimError
 from rigidsim.scene.rotations import quaternion_of
 from rigidsim.scene.row_rotations import (
     SEQUENCES,
@@ -24,116 +28,98 @@ from rigidsim.scene.row_rotations import (
     turned,
     vector_of,
 )
-from rigidsim.store.many_rows import blocks_of, gathered, largest
-from rigidsim.workflows.compare.columns import Attitudes
+from rigidsim.workflows.compare.columns import MATRIX, QUATERNION, Attitudes, size_of
 
 BODY_TO_SPACE, SPACE_TO_BODY = "body_to_space", "space_to_body"
-_LEAST = 1e-9  # rad: mismatches below are alike
-_ALIKE = 0.35  # of mean natural logarithms: readings within a factor of 1.4 are equally near
-_OFFSET_GAIN = 3.0  # the same, that a constant offset has to gain: a factor of 20
-_OFFSET_LEAST = 1e-5  # rad; a smaller one is another start rather than another frame
-_UNLIKE = float(np.log(0.3))  # of relative mismatches: rates are near the experiment's in no reading
-_RATE_UNITS = {
-    "rad/s": 1.0,
-    "deg/s": np.pi / 180,
-    "rpm": np.pi / 30,
-    "rad/day": 1 / 86400.0,
-    "deg/day": np.pi / 180 / 86400.0,
-}
+_LEAST = 1e-9  # rad or relative: mismatches below are alike
+_ALIKE = 0.35  # of mean natural logarithms: candidates within a factor of 1.4 are equally near
+_NEAR = 1.0  # the same of attitudes where rates decide among them
+_OFFSET_GAIN = 3.0  # the same, that a constant turn of the axes has to gain: a factor of 20
+_OFFSET_LEAST = 1e-5  # rad; a smaller one is another start rather than other axes
+_TURNING = float(np.log(0.1))  # of relative mismatches, above which attitudes don't turn at any rates read
+_UNLIKE = float(np.log(0.3))  # the same, above which rates aren't the experiment's, however read
+_FAR = float(np.log(0.15))  # of attitudes (rad), above which no candidate is near the experiment
+_FASTEST = 0.7  # rad from row to row, above which turns don't show rates
+_RATE_UNITS = ("rad/s", "deg/s", "rpm", "rad/day", "deg/day")
 
 
 @dataclass(frozen=True)
-class Reading:
-    """One way to read the attitude of a trajectory.
+class Convention:
+    """How a trajectory is written.
 
     Attributes:
-        order: of a quaternion's columns: "wxyz" or "xyzw"; empty for others.
-        sequence: of Euler angles, empty for others; ``fixed`` if the turns are about fixed axes.
-        unit: of Euler angles, "rad" or "deg"; empty for others.
+        order: of a quaternion's columns in the file, as "wxyz" or "xyzw"; empty for others.
+        direction: "body_to_space" or "space_to_body": what its attitude takes vectors from and to.
+        sequence: of Euler angles, with ``about`` "body" or "fixed" axes; empty for others.
+        unit: of Euler angles. time_unit, rate_unit, rate_axes: of times and rates; empty without rates.
+        offset: "none", "space" or "body": which axes differ from the experiment's, by a constant turn.
+        offset_angle: of that turn, rad. offset_quaternion: w x y z, applied to the trajectory's attitudes
+            from the left (space) or from the right (body).
+        undecided: other conventions that this motion can't tell from this one.
     """
 
     order: str = ""
     direction: str = BODY_TO_SPACE
     sequence: str = ""
-    fixed: bool = False
+    about: str = ""
     unit: str = ""
-
-    def quaternions(self, given: Attitudes, rows: np.ndarray | slice) -> np.ndarray:
-        """Attitudes (rows, 4) w x y z, body to space axes, as they are read in this way."""
-        if given.quaternions is not None:
-            values = given.quaternions[rows]
-            found = values if self.order == "wxyz" else values[:, [3, 0, 1, 2]]
-        elif given.matrices is not None:
-            found = quaternion_of(given.matrices[rows])
-        else:
-            assert given.angles is not None
-            angles = given.angles[rows] * (np.pi / 180 if self.unit == "deg" else 1.0)
-            sequence = self.sequence
-            if self.fixed:  # turns about fixed axes are those about the body's in the other order
-                angles, sequence = angles[:, ::-1], sequence[::-1]
-            found = of_euler(sequence, angles)
-        found = normalised(found)
-        return found if self.direction == BODY_TO_SPACE else conjugated(found)
-
-    def __str__(self) -> str:
-        words = [self.order and f"quaternion {self.order}", self.direction.replace("_", " ")]
-        if self.sequence:
-            words.insert(0, f"{self.sequence} about {'fixed' if self.fixed else 'body'} axes, {self.unit}")
-        return ", ".join(word for word in words if word)
-
-
-@dataclass(frozen=True)
-class Frames:
-    """A constant rotation between the axes of a trajectory and the experiment's.
-
-    Attributes:
-        side: "space" where the space axes differ, "body" where the body axes do, "none".
-        turn: (4,) takes the trajectory's attitudes to the experiment's, from the left (space) or right.
-    """
-
-    side: str
-    turn: np.ndarray
-
-    def applied(self, quaternions: np.ndarray) -> np.ndarray:
-        """Attitudes in the experiment's axes."""
-        if self.side == "none":
-            return quaternions
-        return (
-            multiplied(self.turn, quaternions) if self.side == "space" else multiplied(quaternions, self.turn)
-        )
-
-    def of_body(self, vectors: np.ndarray) -> np.ndarray:
-        """Vectors along the trajectory's body axes in the experiment's."""
-        return turned(conjugated(self.turn), vectors) if self.side == "body" else vectors
-
-    @property
-    def angle(self) -> float:
-        """Its angle, rad."""
-        return 0.0 if self.side == "none" else float(np.linalg.norm(vector_of(self.turn)))
-
-
-NONE = Frames("none", np.array([1.0, 0.0, 0.0, 0.0]))
-
-
-@dataclass(frozen=True)
-class FoundReading:
-    """The convention of a trajectory.
-
-    Attributes:
-        score: mean logarithm of the mismatch, rad, with the experiment at the rows compared.
-        undecided: other readings that are equally near.
-    """
-
-    reading: Reading
-    frames: Frames
-    score: float
-    undecided: list[str]
+    time_unit: str = "s"
+    rate_unit: str = ""
+    rate_axes: str = ""
+    offset: str = "none"
+    offset_angle: float = 0.0
+    offset_quaternion: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
+    undecided: list[str] = field(default_factory=list)
 
     def quaternions(self, given: Attitudes) -> np.ndarray:
-        """All attitudes in the experiment's convention and axes."""
-        return gathered(
-            self.frames.applied(self.reading.quaternions(given, rows)) for rows in blocks_of(len(given.times))
-        )
+        """Attitudes (rows, 4) w x y z, from the experiment's body axes to its space axes."""
+        values = given.attitude
+        if given.kind == QUATERNION:
+            found = values[:, [self.order.index(letter) for letter in "wxyz"]]
+        elif given.kind == MATRIX:
+            found = quaternion_of(values.reshape(-1, 3, 3))
+        else:
+            values, sequence = values * size_of(self.unit, "rad"), self.sequence
+            if self.about == "fixed":  # turns about fixed axes are those about the body's in the other order
+                values, sequence = values[:, ::-1], sequence[::-1]
+            found = of_euler(sequence, values)
+        found = normalised(found)
+        found, turn = found if self.direction == BODY_TO_SPACE else conjugated(found), self._turn
+        if self.offset == "space":
+            return multiplied(turn, found)
+        return multiplied(found, turn) if self.offset == "body" else found
+
+    @property
+    def _turn(self) -> np.ndarray:
+        return np.array(self.offset_quaternion)
+
+    def rates(self, given: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+        """Angular velocities (rows, 3) in the experiment's body axes, rad/s, at these attitudes."""
+        values, turn = given * size_of(self.rate_unit, "rad/s"), self._turn
+        if self.rate_axes == "body":
+            return turned(conjugated(turn), values) if self.offset == "body" else values
+        return turned(conjugated(quaternions), turned(turn, values) if self.offset == "space" else values)
+
+    def turned_to(self, read: np.ndarray, own: np.ndarray) -> Iterator[Convention]:
+        """This one and two with other axes, in which an attitude (4,) that it reads is the experiment's."""
+        yield self
+        back = conjugated(read)
+        for side, product in (("space", multiplied(own, back)), ("body", multiplied(back, own))):
+            turn = normalised(product)
+            if (angle := float(np.linalg.norm(vector_of(turn)))) > _OFFSET_LEAST:
+                yield replace(self, offset=side, offset_angle=angle, offset_quaternion=tuple(turn.tolist()))
+
+    def __str__(self) -> str:
+        words = [self.direction.replace("_", " ")]
+        if self.sequence:
+            words.insert(0, f"Euler angles {self.sequence} about {self.about} axes in {self.unit}")
+        else:
+            words.insert(0, f"quaternion in columns {', '.join(self.order)}" if self.order else "matrix")
+        if self.rate_unit:
+            words.append(f"rates along {self.rate_axes} axes in {self.rate_unit}")
+        if self.offset != "none":
+            words.append(f"{self.offset} axes turned by {np.degrees(self.offset_angle):.6g} deg")
+        return ", ".join(words)
 
 
 def rows_compared(count: int) -> np.ndarray:
@@ -143,125 +129,134 @@ def rows_compared(count: int) -> np.ndarray:
     return np.unique(np.concatenate([even, early]).astype(int))
 
 
-def find_convention(given: Attitudes, motion: np.ndarray, allowed: Collection[Reading] = ()) -> FoundReading:
-    """The reading nearest to the experiment's attitudes (rows, 4), to which the trajectory may have further
-    rows; of those allowed, if any.
-    """
-    rows = slice(len(motion))
-    tried = []
-    for cost, reading in enumerate(readings(given)):
-        if allowed and reading not in allowed:
-            continue
-        read = reading.quaternions(given, rows)
-        tried.append((_score(read, motion), cost, reading, NONE, read))
-    best = min(tried, key=lambda x: x[0])[0]
-    offset = []
-    for _, cost, reading, _, read in tried:
-        for side, turn in _turns(read[0], motion[0]):
-            frames = Frames(side, turn)
-            if frames.angle > _OFFSET_LEAST:
-                score = _score(frames.applied(read), motion)
-                offset.append((score, cost, reading, frames, read))
-    if offset and min(x[0] for x in offset) < best - _OFFSET_GAIN:
-        tried = offset
-        best = min(x[0] for x in offset)
-    near = sorted((x for x in tried if x[0] <= best + _ALIKE), key=lambda x: (x[1], x[3].side != "space"))
-    score, _, reading, frames, _ = near[0]
-    named = [f"{x[2]}{_axes(x[3])}" for x in near[1:]]
-    return FoundReading(reading, frames, score, named)
+def attitude_conventions(given: Attitudes) -> list[Convention]:
+    """All ways to read the attitude, the plainest first."""
+    settled = given.trajectory.settled
+    found = [Convention(direction=x) for x in (BODY_TO_SPACE, SPACE_TO_BODY)[: 1 if settled else 2]]
+    if given.kind == QUATERNION:
+        orders = [given.order] if given.order else ["wxyz", "xyzw"]
+        return [replace(one, order=order) for order in orders for one in found]
+    if given.kind == MATRIX:
+        return found
+    units = ["deg", "rad"] if np.abs(given.attitude).max() > 4 * np.pi else ["rad", "deg"]
+    return [
+        replace(one, sequence=sequence, about=about, unit=unit)
+        for unit in ([given.unit] if given.unit else units)
+        for about in ("body", "fixed")
+        for one in found
+        for sequence in SEQUENCES
+    ]
 
 
-def _axes(frames: Frames) -> str:
-    return "" if frames.side == "none" else f", other {frames.side} axes"
+def rate_conventions(given: Attitudes) -> list[dict[str, Any]]:
+    """The same of units and axes of the rates."""
+    units = [given.rate_unit] if given.rate_unit else list(_RATE_UNITS)
+    axes = ("body",) if given.trajectory.settled else ("body", "space")
+    return [{"rate_unit": unit, "rate_axes": one} for unit in units for one in axes]
 
 
-def readings(given: Attitudes) -> Iterator[Reading]:
-    """All ways to read an attitude, the plainest first."""
-    directions = (BODY_TO_SPACE,) if given.trajectory.settled else (BODY_TO_SPACE, SPACE_TO_BODY)
-    if given.quaternions is not None:
-        orders = ("wxyz",) if given.named else ("wxyz", "xyzw")
-        yield from (Reading(order=order, direction=d) for order in orders for d in directions)
-    elif given.matrices is not None:
-        yield from (Reading(direction=d) for d in directions)
-    else:
-        units = ["deg", "rad"] if _degrees(given) else ["rad", "deg"]
-        if given.angle_unit in units:
-            units = [given.angle_unit]
-        for unit in units:
-            for fixed in (False, True):
-                for direction in directions:
-                    yield from (
-                        Reading(sequence=s, fixed=fixed, unit=unit, direction=direction) for s in SEQUENCES
-                    )
-
-
-def _degrees(given: Attitudes) -> bool:
-    """Whether Euler angles look like degrees: beyond a few turns of radians."""
-    assert given.angles is not None
-    return largest(given.angles) > 4 * np.pi
-
-
-def _score(read: np.ndarray, motion: np.ndarray) -> float:
-    return float(np.mean(np.log(angles_between(read, motion) + _LEAST)))
-
-
-def _turns(read: np.ndarray, motion: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """The rotations that take the first attitude to the experiment's, from either side."""
-    yield "space", normalised(multiplied(motion, conjugated(read)))
-    yield "body", normalised(multiplied(conjugated(read), motion))
-
-
-@dataclass(frozen=True)
-class RateReading:
-    """How angular velocities are read: unit, and axes ("body" or "space")."""
-
-    unit: str
-    axes: str
-
-    def rates(self, given: np.ndarray, found: FoundReading, quaternions: np.ndarray) -> np.ndarray:
-        """Angular velocities (rows, 3) in the experiment's body axes, rad/s.
-
-        Args:
-            quaternions: attitudes of the same rows in the experiment's convention and axes.
-        """
-        values = given * _RATE_UNITS[self.unit]
-        if self.axes == "body":
-            return found.frames.of_body(values)
-        if found.frames.side == "space":
-            values = turned(found.frames.turn, values)
-        return turned(conjugated(quaternions), values)
-
-
-def possible_rates(given: Attitudes) -> list[RateReading]:
-    """Units and axes in which rates may be written, the plainest first."""
-    units = [given.rate_unit] if given.rate_unit in _RATE_UNITS else list(_RATE_UNITS)
-    return [RateReading(str(unit), axes) for unit in units for axes in ("body", "space")]
-
-
-def find_rates(
-    given: Attitudes,
-    found: FoundReading,
-    quaternions: np.ndarray,
-    motion: np.ndarray,
-    allowed: Collection[RateReading] = (),
-) -> tuple[RateReading, list[str]]:
-    """The reading of rates nearest to the experiment's (rows, 3), and others that are equally near.
+def find_convention(
+    given: Attitudes, asked: Mapping[str, str], motion: tuple[np.ndarray, np.ndarray] | None = None
+) -> tuple[Convention, list[str]]:
+    """The convention of a trajectory, and what a user should know of it.
 
     Args:
-        quaternions: attitudes of its rows as the trajectory has them, in the experiment's convention.
-        allowed: readings that may be taken; any if there are none.
+        asked: values that attributes of the convention have to have.
+        motion: attitudes (rows, 4) and rates (rows, 3) of the experiment. Without it, the attitudes have to
+            turn at the rates in the file.
+
+    Raises:
+        RigidsimError: no convention has the values asked for; or, without an experiment, the attitudes turn
+            at the rates in none.
     """
-    assert given.rates is not None
-    size = float(np.sqrt(np.mean(np.sum(motion**2, axis=1)))) or 1.0
-    tried = []
-    for reading in possible_rates(given):
-        if allowed and reading not in allowed:
-            continue
-        read = reading.rates(given.rates, found, quaternions)
-        apart = np.linalg.norm(read - motion, axis=1) / size
-        tried.append((float(np.mean(np.log(apart + _LEAST))), reading))
+    rows = rows_compared(len(given.times) - 1)
+    here, there, steps = given.at(rows), given.at(rows + 1), np.diff(given.times)[rows, None]
+    plain, rated = attitude_conventions(given), [{}] if given.rates is None else rate_conventions(given)
+    _refuse_others(given, asked, plain, rated)
+    plain = [one for one in plain if _has(one, asked, "order", "direction", "sequence", "about", "unit")]
+    tried = [(0.0, one) for one in plain]
+    if motion is not None:
+        own = motion[0][rows]
+        tried = [
+            (_mean(angles_between(one.quaternions(here), own)) + _OFFSET_GAIN * (one.offset != "none"), one)
+            for start in plain
+            for one in start.turned_to(start.quaternions(here)[0], own[0])
+            if _has(one, asked, "offset")
+        ]
+    nearest = min(score for score, _ in tried)
+    near, turns = _near(tried, _ALIKE), False
+    if given.rates is not None:
+        both = [
+            (_turning(one, here, there, steps), one)
+            for start in _near(tried, _NEAR)
+            for one in (replace(start, **more) for more in rated)
+            if _has(one, asked, "rate_unit", "rate_axes")
+        ]
+        turns = min(score for score, _ in both) < _TURNING
+        near = _near(both, _ALIKE) if turns else [one for _, one in both if replace(one, **_NO_RATES) in near]
+        if motion is not None:
+            far = [(_apart(one, here, motion[1][rows]), one) for one in near]
+            best = min(score for score, _ in far)
+            named = {"rate_unit": near[0].rate_unit, "rate_axes": near[0].rate_axes}
+            like = turns or best < _UNLIKE
+            near = _near(far, _ALIKE) if like else [one for one in near if _has(one, named, *named)]
+    if motion is None and given.rates is not None and not turns:
+        raise RigidsimError(
+            f"{given.trajectory.source}: in no convention tried does its attitude turn at its rates, or its "
+            "rows are too far apart; rigidsim compare CONFIG FILE --timeline finds the convention with an "
+            "experiment"
+        )
+    told = []
+    if motion is not None and nearest > _FAR:
+        why = "this is one in which it turns at its rates" if turns else "that found may be wrong"
+        told.append(f"no convention tried brings it near the experiment: {why}")
+    return replace(near[0], time_unit=given.time_unit or "s", undecided=[str(one) for one in near[1:]]), told
+
+
+_NO_RATES: dict[str, Any] = {"rate_unit": "", "rate_axes": ""}
+
+
+def _has(one: Convention, asked: Mapping[str, str], *keys: str) -> bool:
+    return all(getattr(one, key) == asked.get(key, getattr(one, key)) for key in keys)
+
+
+def _near(tried: list[tuple[float, Convention]], within: float) -> list[Convention]:
     best = min(score for score, _ in tried)
-    near = [reading for score, reading in tried if score <= best + _ALIKE]
-    if not allowed and best > _UNLIKE:  # near in no unit: as the columns are named
-        near = [reading for _, reading in tried[:1]]
-    return near[0], [f"rates along {x.axes} axes, {x.unit}" for x in near[1:]]
+    return [one for score, one in tried if score <= best + within]
+
+
+def _mean(mismatches: np.ndarray) -> float:
+    return float(np.mean(np.log(mismatches + _LEAST)))
+
+
+def _turning(one: Convention, here: Attitudes, there: Attitudes, steps: np.ndarray) -> float:
+    """Mismatch of the attitudes' turning with the rates, relative to these."""
+    assert here.rates is not None
+    assert there.rates is not None
+    before, after = one.quaternions(here), one.quaternions(there)
+    turns = vector_of(multiplied(conjugated(before), after))
+    mean = (one.rates(here.rates, before) + one.rates(there.rates, after)) / 2
+    size = float(np.linalg.norm(mean, axis=1).mean()) or 1.0
+    slow = np.median(np.linalg.norm(turns, axis=1)) <= _FASTEST
+    return _mean(np.linalg.norm(turns / steps - mean, axis=1) / size) if slow else float("inf")
+
+
+def _apart(one: Convention, here: Attitudes, motion: np.ndarray) -> float:
+    """Mismatch of the rates with the experiment's, relative to these."""
+    assert here.rates is not None
+    size = float(np.sqrt(np.mean(np.sum(motion**2, axis=1)))) or 1.0
+    return _mean(np.linalg.norm(one.rates(here.rates, one.quaternions(here)) - motion, axis=1) / size)
+
+
+def _refuse_others(
+    given: Attitudes, asked: Mapping[str, str], plain: list[Convention], rated: list[dict[str, Any]]
+) -> None:
+    """Refuse values that no convention has."""
+    keys = ("order", "direction", "sequence", "about", "unit")
+    allowed = {key: {getattr(one, key): None for one in plain} for key in keys}
+    allowed |= {key: {one.get(key, ""): None for one in rated} for key in _NO_RATES}
+    allowed["offset"] = dict.fromkeys(("none", "space", "body"))
+    if any(value not in allowed.get(key, ()) for key, value in asked.items()):
+        words = ", ".join(f"{key}={value}" for key, value in asked.items())
+        shown = "; ".join(f"{key} = {', '.join(x)}" for key, x in allowed.items() if any(x))
+        raise RigidsimError(f"{given.trajectory.source}: convention: given {words}; allowed: {shown}")

@@ -19,7 +19,6 @@ import numpy as np
 
 from rigidsim.scene.row_rotations import conjugated, multiplied, normalised, turned, vector_of
 from rigidsim.solve.from_states import FromStates, RowStates
-from rigidsim.store.many_rows import picked
 
 _WINDOW = 0.5  # times the rate of the motion: length of a window, where the rows allow it
 _PARTS = 4  # of a window
@@ -70,9 +69,9 @@ class WindowDefects:
 def motion_rate(times: np.ndarray, rates: np.ndarray) -> float:
     """The rate of a motion, rad/s: that of its turning, or of the change of its rates, if that is faster."""
     rows = np.unique(np.linspace(0, len(times) - 2, min(len(times) - 1, _MOST_RATES)).astype(int))
-    size = float(np.sqrt(np.mean(np.sum(picked(rates, np.append(rows, rows[-1] + 1)) ** 2, axis=1))))
-    steps = picked(times, rows + 1) - picked(times, rows)
-    change = (picked(rates, rows + 1) - picked(rates, rows)) / steps[:, None]
+    size = float(np.sqrt(np.mean(np.sum(rates[np.append(rows, rows[-1] + 1)] ** 2, axis=1))))
+    steps = times[rows + 1] - times[rows]
+    change = (rates[rows + 1] - rates[rows]) / steps[:, None]
     bend = float(np.sqrt(np.sum(change**2, axis=1) @ steps / steps.sum()))
     return max(size, bend / size if size else 0.0)
 
@@ -87,16 +86,16 @@ def windows_of_rows(times: np.ndarray, rate: float, length: float, parts: int, m
     count = len(times)
     starts = np.unique(np.linspace(0, max(count - 1 - parts, 0), most).astype(int))
     steps = np.arange(parts + 1)
-    goals = picked(times, starts)[:, None] + length / rate * steps / parts
+    goals = times[starts][:, None] + length / rate * steps / parts
     rows = np.maximum.accumulate(np.searchsorted(times, goals) - steps, axis=1) + steps
     rows = rows[rows[:, -1] < count]
-    gaps = np.diff(picked(times, rows.ravel()).reshape(rows.shape), axis=1).max(axis=1, initial=0.0)
+    gaps = np.diff(times[rows.ravel()].reshape(rows.shape), axis=1).max(axis=1, initial=0.0)
     return np.asarray(rows[gaps * rate < RESOLVED])
 
 
 def row_defects(equations: FromStates, times: np.ndarray, states: RowStates, rows: np.ndarray) -> RowDefects:
     """Defects from some rows to the next ones; ``states`` are the trajectory's."""
-    ends = ends_of(equations, states[rows], picked(times, rows), picked(times, rows + 1))
+    ends = ends_of(equations, states[rows], times[rows], times[rows + 1])
     attitude, rates = _apart(equations, states[rows + 1], ends)
     return RowDefects(rows, attitude, rates)
 
@@ -117,7 +116,7 @@ def window_defects(
     for parts in range(_PARTS, 1, -1):
         windows = windows_of_rows(times, rate, _WINDOW, parts, most)
         if parts > 2:
-            ends = picked(times, windows[:, -1]) - picked(times, windows[:, 0])
+            ends = times[windows[:, -1]] - times[windows[:, 0]]
             windows = windows[ends * rate < RESOLVED]
         if len(windows) >= _ENOUGH * min(most, len(times) - parts):
             break

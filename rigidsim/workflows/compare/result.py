@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import PrivateAttr
 
+from rigidsim.store.outputs import writing
 from rigidsim.store.summary_parts import SummaryPart
+from rigidsim.workflows.compare.conventions import Convention
 
 if TYPE_CHECKING:
     import xarray
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
 
 AGREES, INTEGRATION_ERROR, WRONG_MODEL, UNDECIDED = "agrees", "integration_error", "wrong_model", "undecided"
 INCONSISTENT_RATES = "inconsistent_rates"
+_MOST_DRAWN = 4000  # points of a figure
 
 
 class AttitudeError(SummaryPart):
@@ -28,34 +31,6 @@ class AttitudeError(SummaryPart):
     rms: float
     time: float
     row: str
-
-
-class FoundConvention(SummaryPart):
-    """How the trajectory is written.
-
-    Attributes:
-        order: of a quaternion's columns in the file, "wxyz" or "xyzw"; empty for others.
-        direction: "body_to_space" or "space_to_body": what its attitude takes vectors from and to.
-        sequence: of Euler angles, with ``about`` "body" or "fixed" axes; empty for others.
-        unit: of Euler angles. time_unit, rate_unit, rate_axes: of times and rates; empty without rates.
-        offset: "none", "space" or "body": which axes are others than the experiment's, by a constant turn.
-        offset_angle: of that turn, rad. offset_quaternion: w x y z, applied to the trajectory's attitudes
-            from the left (space) or from the right (body).
-        undecided: other readings that this motion can't tell from this one.
-    """
-
-    order: str
-    direction: str
-    sequence: str
-    about: str
-    unit: str
-    time_unit: str
-    rate_unit: str
-    rate_axes: str
-    offset: str
-    offset_angle: float
-    offset_quaternion: list[float]
-    undecided: list[str]
 
 
 class TrajectoryDrift(SummaryPart):
@@ -126,7 +101,7 @@ class Comparison(SummaryPart):
     attitude_error: AttitudeError
     rate_error: float | None
     position_error: float | None
-    convention: FoundConvention
+    convention: Convention
     drifts: list[TrajectoryDrift]
     local_defects: LocalDefects | None
     first_disagreement: Disagreement | None
@@ -146,15 +121,20 @@ class Comparison(SummaryPart):
     def plot(self) -> Figure:
         """Attitude error, drifts and local defects along time."""
         from rigidsim.look.figures.compared import compared_figure
-        from rigidsim.workflows.compare.saving import thinned
 
         return compared_figure(thinned(self.dataset))
 
     def save(self, path: str | Path) -> Path:
         """Write the dataset (netCDF-4/HDF5)."""
-        from rigidsim.workflows.compare.saving import save_dataset
+        with writing(Path(path)) as temporary:
+            self.dataset.to_netcdf(temporary, engine="h5netcdf")
+        return Path(path)
 
-        return save_dataset(self.dataset, Path(path))
+    def with_files(self, **names: str) -> Comparison:
+        """The same with the names of files that were written."""
+        made = self.having(**names)
+        made._dataset = self._dataset
+        return made
 
     def __repr__(self) -> str:
         error = self.attitude_error
@@ -174,3 +154,11 @@ class Comparison(SummaryPart):
         rows += [(f"drift of {x.name}", f"{x.largest:.3g}") for x in self.drifts]
         cells = "".join(f"<tr><th>{escape(a)}</th><td>{escape(b)}</td></tr>" for a, b in rows)
         return f"<table>{cells}</table>"
+
+
+def thinned(dataset: xarray.Dataset) -> xarray.Dataset:
+    """A comparison's dataset with, of very many rows, the largest of each stretch, as a figure shows them."""
+    stretch = -(-dataset.sizes["time"] // _MOST_DRAWN)
+    return (
+        dataset if stretch == 1 else abs(dataset).coarsen(time=stretch, boundary="pad").max(keep_attrs=True)
+    )
