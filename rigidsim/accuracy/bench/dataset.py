@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING
@@ -31,6 +31,23 @@ TOLD = (
 """Attributes of a measurement that its JSON repeats."""
 
 
+_RELATIVE = "relative to the default setting, per simulated second"
+_NUMBERS = {
+    "attitude_error_final": ("rad", "attitude error at the end of what was measured"),
+    "attitude_error_largest": ("rad", "largest attitude error"),
+    "reference_error": ("rad", "error of the reference itself, estimated, at the end"),
+    "cpu_ratio": ("1", f"CPU time, median of the processes, {_RELATIVE}"),
+    "cpu_ratio_least": ("1", f"CPU time, least of the processes, {_RELATIVE}"),
+    "cpu_ratio_largest": ("1", f"CPU time, largest of the processes, {_RELATIVE}"),
+    "cpu_seconds": ("s", "CPU time of the measured part"),
+    "steps": ("1", "natural Taylor steps"),
+    "taylor_order": ("1", "order of the Taylor series"),
+    "work": ("1", "steps x order^2 x states"),
+    "measured_time": ("s", "how much of the motion was measured"),
+}
+"""Numbers of a setting, nan where it wasn't measured: units and what they are."""
+
+
 def dataset_of(measured: Measurement) -> xarray.Dataset:
     """The measurement as xarray data: dimensions ``setting``, ``time``, ``invariant``.
 
@@ -41,30 +58,22 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
 
     from rigidsim.store.provenance import versions
 
-    rows, plan = measured.rows, measured.plan
-    tried = [row.trial for row in rows]
-    drifted = [{} if trial is None else trial.drifts for trial in tried]
-    names = sorted({name for drifts in drifted for name in drifts})
-    span = plan.end - plan.start
+    rows, plan, span = measured.rows, measured.plan, measured.plan.span
+    drifts = [{} if row.trial is None else row.trial.drifts for row in rows]
+    names = sorted({name for one in drifts for name in one})
     error = np.full((len(rows), len(plan.times)), np.nan)
-    own = np.full(len(rows), np.nan)
-    cost = np.full((len(rows), 3), np.nan)
+    columns: dict[str, list[float]] = {name: [math.nan] * len(rows) for name in _NUMBERS}
     for n, row in enumerate(rows):
-        if row.measured:
-            errors, reference = measured.errors(row)
-            error[n, : len(errors)], own[n] = errors, float(reference[-1])
-            cost[n] = measured.cost(row)
-    final = np.array([e[np.isfinite(e)][-1] if np.isfinite(e).any() else np.nan for e in error])
-    largest = np.array([np.nanmax(e) if np.isfinite(e).any() else np.nan for e in error])
-    known = [r.measured for r in rows]
+        if not row.measured or row.trial is None:
+            continue
+        errors, own = row.errors()
+        error[n, : len(errors)] = errors
+        cost, trial = row.cost(rows[0]), row.trial
+        values = [errors[-1], errors.max(), own[-1], *cost, row.cpu_seconds, trial.steps, trial.order]
+        for name, value in zip(_NUMBERS, [*values, trial.work, row.part * span], strict=True):
+            columns[name][n] = float(value)
 
-    def numbers(values: Sequence[float]) -> np.ndarray:
-        return np.where(known, np.array(values, dtype=np.float64), np.nan)
-
-    def counts(name: str) -> np.ndarray:
-        return numbers([math.nan if trial is None else getattr(trial, name) for trial in tried])
-
-    def words(values: Sequence[object]) -> np.ndarray:
+    def words(values: Iterable[object]) -> np.ndarray:
         return np.array([str(value) for value in values], dtype=object)
 
     def variable(
@@ -72,50 +81,27 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
     ) -> tuple[Sequence[str], ArrayLike, dict[str, str]]:
         return (dims, values, {"units": units, "long_name": long_name})
 
-    tolerances = [r.setting.step_tolerance if r.setting.has_steps else math.nan for r in rows]
-    relative = "relative to the default setting, per simulated second"
+    settings = [row.setting for row in rows]
+    drift = np.array([one.get(name, np.nan) for one in drifts for name in names]).reshape(len(rows), -1)
+    tolerances = [s.step_tolerance if s.has_steps else math.nan for s in settings]
+    precisions = words(precision_title(s.precision) for s in settings)
+    held = np.array([s.hold_invariants for s in settings], dtype=np.int8)
+    across = ("setting", "invariant")
     data = xarray.Dataset(
         {
-            "status": variable(words([r.status.value for r in rows]), "1", "what became of the setting"),
-            "reason": variable(words([r.problem for r in rows]), "1", "why it was not measured"),
+            "status": variable(words(r.status.value for r in rows), "1", "what became of the setting"),
+            "reason": variable(words(r.problem for r in rows), "1", "why it was not measured"),
             "attitude_error": variable(error, "rad", "attitude error", ("setting", "time")),
-            "attitude_error_final": variable(final, "rad", "attitude error at the end of what was measured"),
-            "attitude_error_largest": variable(largest, "rad", "largest attitude error"),
-            "reference_error": variable(own, "rad", "error of the reference itself, estimated, at the end"),
-            "cpu_ratio": variable(cost[:, 0], "1", f"CPU time, median of the processes, {relative}"),
-            "cpu_ratio_least": variable(cost[:, 1], "1", f"CPU time, least of the processes, {relative}"),
-            "cpu_ratio_largest": variable(cost[:, 2], "1", f"CPU time, largest of the processes, {relative}"),
-            "cpu_seconds": variable(
-                numbers([measured.cpu_seconds(r) for r in rows]), "s", "CPU time of the measured part"
-            ),
-            "steps": variable(counts("steps"), "1", "natural Taylor steps"),
-            "taylor_order": variable(counts("order"), "1", "order of the Taylor series"),
-            "work": variable(counts("work"), "1", "steps x order^2 x states"),
-            "measured_time": variable(
-                numbers([row.part * span for row in rows]), "s", "how much of the motion was measured"
-            ),
-            "drift": variable(
-                np.array([[drifts.get(name, np.nan) for name in names] for drifts in drifted]).reshape(
-                    len(rows), len(names)
-                ),
-                "1",
-                "largest relative drift of the invariant",
-                ("setting", "invariant"),
-            ),
+            **{name: variable(columns[name], *said) for name, said in _NUMBERS.items()},
+            "drift": variable(drift, "1", "largest relative drift of the invariant", across),
         },
         coords={
-            "setting": ("setting", words([r.setting.title for r in rows]), {"long_name": "setting"}),
-            "precision": variable(
-                words([precision_title(r.setting.precision) for r in rows]), "1", "arithmetic"
-            ),
+            "setting": ("setting", words(s.title for s in settings), {"long_name": "setting"}),
+            "precision": variable(precisions, "1", "arithmetic"),
             "tolerance": variable(tolerances, "1", "of the step control"),
-            "formulation": variable(words([r.setting.formulation for r in rows]), "1", "of the attitude"),
-            "held": variable(
-                np.array([r.setting.hold_invariants for r in rows], dtype=np.int8),
-                "1",
-                "invariants projected",
-            ),
-            "method": variable(words([r.setting.method for r in rows]), "1", " or ".join(METHODS)),
+            "formulation": variable(words(s.formulation for s in settings), "1", "of the attitude"),
+            "held": variable(held, "1", "invariants projected"),
+            "method": variable(words(s.method for s in settings), "1", " or ".join(METHODS)),
             "time": ("time", np.array(plan.times), {"units": "s", "long_name": "since start of the scene"}),
             "invariant": ("invariant", words(names), {"long_name": "invariant"}),
         },
@@ -125,7 +111,7 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
             "config_sha256": measured.experiment.sha256,
             "compared": "attitudes, carried in every setting, whatever the config records",
             "reference": measured.reference.how,
-            "reference_of_quadruple": (measured.wide_reference or measured.reference).how,
+            "reference_of_quadruple": measured.wide_reference.how,
             "default_setting": DEFAULT.title,
             "horizon_seconds": span,
             "measured_seconds": plan.part * span,
@@ -135,10 +121,8 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
             **versions(),
         },
     )
-    front = on_front(data)
-    data["on_front"] = variable(
-        front.astype(np.int8), "1", "no other setting is both cheaper and more accurate"
-    )
+    front = on_front(data).astype(np.int8)
+    data["on_front"] = variable(front, "1", "no other setting is both cheaper and more accurate")
     return data
 
 

@@ -11,7 +11,7 @@ import math
 import random
 import statistics
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -53,11 +53,14 @@ _ALL, _REFERENCE, _QUADRUPLE, _DIGITS = (0.3, 350.0), (0.3, 1300.0), (0.1, 2600.
 together, of their reference in quadruple precision, of all quadruple settings, and of the reference of these.
 """
 _SECOND: dict[str | int, float] = {"quadruple": 1e-30, LEAST_DIGITS: 1e-44}
-"""Tolerances of the second best of a precision: a thousand epsilons or more, so that it is another solution;
-in extended and double precision "auto" without projected invariants is.
+"""Tolerances of the second best of a precision, from which the error of the best is known: a thousand
+epsilons or more, so that it is another solution; in extended and double precision "auto" without projected
+invariants is.
 """
-_SAME_VARIABLES = 10.0
-"""Ratio of the common error of solutions in the same variables to their distance."""
+_SAME_STEPS = 10.0
+"""Ratio of the error of the best to that distance, where both take the same steps until invariants are first
+projected: it was up to six times too small (13 once).
+"""
 _SAMPLES, _SHORT_SAMPLES = 32, 6  # attitudes compared, over the whole part and over the short one
 
 
@@ -72,38 +75,29 @@ class RowStatus(StrEnum):
 
 @dataclass(frozen=True)
 class Plan:
-    """How much of the motion is measured: ascending times (s), of which the first ``short_count`` reach to
-    the end of ``short``; and the method that gives the motion without steps, or why there is none.
+    """How much of the motion is measured: times (s, ascending) over a ``part`` of it, and over a shorter one;
+    the steps and samples of the whole; and the method that gives it without steps, or why there is none.
     """
 
-    start: float
-    end: float
+    span: float
     steps: float
+    samples: int
     part: float
     short: float
     times: tuple[float, ...]
-    short_count: int
+    short_times: tuple[float, ...]
     exact: str
     why: str
-    samples: int
 
-    def task(self, setting: Setting, patience: float = math.inf, *, wide: bool) -> Task:
-        """Task that computes a setting's attitudes over all times, the short part of them if ``wide``."""
-        return Task(setting, self.times[: self.short_count] if wide else self.times, patience)
-
-    @property
     def references(self) -> list[Task]:
-        """What to integrate as references: the closed form if there is one."""
+        """What to integrate as references, with the second best of each."""
         if self.exact:
-            return [self.task(Setting(LEAST_DIGITS, method=self.exact), wide=False)]
-        return [
-            self.task(setting, wide=precision == LEAST_DIGITS)
-            for precision in ("quadruple", LEAST_DIGITS)
-            for setting in _best_and_second(precision)
-        ]
+            return [Task(Setting(LEAST_DIGITS, method=self.exact), self.times)]
+        wide = [Task(s, self.times) for s in _best_and_second("quadruple")]
+        return wide + [Task(s, self.short_times) for s in _best_and_second(LEAST_DIGITS)]
 
 
-def make_plan(experiment: Experiment, budget: float) -> Plan:
+def _plan(experiment: Experiment, budget: float) -> Plan:
     """Make a plan from a short pilot of the default setting. Raises ``ConfigError``."""
     scene = build_scene(experiment)
     start, end = float(scene.start), float(scene.samples.last)
@@ -112,45 +106,32 @@ def make_plan(experiment: Experiment, budget: float) -> Plan:
     pilot = run_pilot(corrected.stepper, prepared.clock, corrected.skip, steps=_PILOT_STEPS, warming=_WARMING)
     whole = pilot.whole * pilot.seconds_per_step
     form, why = closed_form_if_any(scene)
-    exact = form.method if form else ""
     part, reference, quadruple, digits = (
         share * budget / (whole * cost) for share, cost in (_ALL, _REFERENCE, _QUADRUPLE, _DIGITS)
     )
-    part = min(1.0, part if exact else min(part, reference))
-    short = min(part, quadruple if exact else min(quadruple, digits))
-    short_times = grid(start, end, short, _SHORT_SAMPLES) if short < part else ()
+    part = min(1.0, part if form else min(part, reference))
+    short = min(part, quadruple if form else min(quadruple, digits))
+    early = _grid(start, end, short, _SHORT_SAMPLES) if short < part else ()
     # the start is a sample, so that the motion begins there
-    times = tuple(sorted({start, *short_times, *grid(start, end, part, _SAMPLES)}))
-    limit = short_times[-1] if short_times else times[-1]
-    return Plan(
-        start=start,
-        end=end,
-        steps=pilot.whole,
-        part=part,
-        short=short,
-        times=times,
-        short_count=sum(t <= limit for t in times),
-        exact=exact,
-        why=why,
-        samples=scene.samples.count,
-    )
+    times = tuple(sorted({start, *early, *_grid(start, end, part, _SAMPLES)}))
+    less = tuple(t for t in times if t <= (early or times)[-1])
+    exact = form.method if form else ""
+    return Plan(end - start, pilot.whole, scene.samples.count, part, short, times, less, exact, why)
 
 
-def grid(start: float, end: float, part: float, count: int) -> tuple[float, ...]:
+def _grid(start: float, end: float, part: float, count: int) -> tuple[float, ...]:
     """Times over the first part of a motion that are exact in single precision too."""
     exact = start + (end - start) * part * np.arange(1, count + 1) / count
     rounded = exact.astype(np.float32)
-    late = rounded.astype(np.float64) > exact
-    rounded[late] = np.nextafter(rounded[late], np.float32(-np.inf))
+    rounded = np.where(rounded > exact, np.nextafter(rounded, np.float32(-np.inf)), rounded)
     return tuple(sorted({float(t) for t in rounded if float(t) > start})) or (float(exact[-1]),)
 
 
-def every_setting(plan: Plan, *, full: bool = False) -> list[Setting]:
+def _settings(plan: Plan, *, full: bool) -> list[Setting]:
     """All settings, the cheapest first since a budget cuts at the end: the default one, those in quaternions
     and closed forms, and other formulations.
     """
-    general = [name for name, variables in FORMULATIONS.items() if variables.general]
-    others = [name for name in general if name != DEFAULT.formulation]
+    others = [n for n, variables in FORMULATIONS.items() if variables.general and n != DEFAULT.formulation]
     plain = [Setting(p, tolerance) for p, some in _TOLERANCES.items() for tolerance in (None, *some)]
     few = [s for s in plain if s.precision != "quadruple" and (full or s.tolerance is None)]
     few += [Setting("double", tolerance) for tolerance in _FEW_TOLERANCES]
@@ -168,9 +149,6 @@ def every_setting(plan: Plan, *, full: bool = False) -> list[Setting]:
 
 # --- references ---------------------------------------------------------------------------------------------
 
-Solutions = Mapping[Setting, list[np.ndarray]]
-"""Attitudes by setting, float64 parts (samples, 4)."""
-
 
 @dataclass(frozen=True)
 class ReferenceSolution:
@@ -183,71 +161,32 @@ class ReferenceSolution:
     how: str
 
 
-def best_reference(
-    plan: Plan, found: Mapping[Task, Answer]
-) -> tuple[ReferenceSolution, ReferenceSolution | None]:
-    """The reference, and a separate one for quadruple precision if needed; of what was measured over the same
-    times the best serves if there is nothing better. Raises ``RigidsimError`` if there is none.
+def _reference(
+    found: Mapping[Task, Answer], times: tuple[float, ...], precisions: Sequence[str | int]
+) -> ReferenceSolution | None:
+    """The best solution of the first precision in which the second best is known, too: its error is the
+    largest distance between them so far. This isn't scaled by the errors per step, as certificates do: a
+    series keeps its tolerance by orders of magnitude, so that rounding can dominate in both (near a
+    separatrix, in quadruple precision and at 1e-30, scaled errors were 70 times too small).
     """
-
-    def over(times: tuple[float, ...]) -> Solutions:
-        whole = {task.setting: a.trial for task, a in found.items() if task.times == times and not a.problem}
-        return {setting: trial.attitudes for setting, trial in whole.items() if trial is not None}
-
-    solutions = over(plan.times)
-    exact = Setting(LEAST_DIGITS, method=plan.exact) if plan.exact else None
-    if exact is not None and exact in solutions:
-        own = np.full(len(plan.times), 10.0 ** (2 - LEAST_DIGITS))  # two digits are left to rounding
-        return ReferenceSolution(solutions[exact], own, f"closed form to {LEAST_DIGITS} digits"), None
-    for precision in ("quadruple", "extended", "double"):
-        best = _best_of(precision, solutions)
-        if best is not None:
-            return best, _best_of(LEAST_DIGITS, over(plan.times[: plan.short_count]))
-    raise RigidsimError(
-        "tradeoff: no reference could be integrated within the budget; give a larger --budget"
-    )
+    for precision in precisions:
+        best, second = _best_and_second(precision)
+        one, other = (_attitudes(found, Task(setting, times)) for setting in (best, second))
+        if one is not None and other is not None:
+            apart = angles_between(one, other) * (1.0 if precision in _SECOND else _SAME_STEPS)
+            error = np.maximum(np.maximum.accumulate(apart), epsilon(precision))
+            how = f"{best.title}; its error is its distance from {second.title}"
+            return ReferenceSolution(one, error, how)
+    return None
 
 
-def _best_of(precision: str | int, solutions: Solutions) -> ReferenceSolution | None:
-    """The best solution of a precision, if there are others as good, or nearly so, from which its error is
-    known: in extended and double precision also those with rotation-matrix states, which round other initial
-    values and coefficients.
-    """
-    best, second = _best_and_second(precision)
-    peers = () if precision in _SECOND else (FORMULATIONS[best.formulation].checked_by,)
-    equals = [
-        other
-        for other in solutions
-        if other != best
-        and (other.precision, other.method, other.tolerance) == (precision, best.method, second.tolerance)
-        and other.formulation in (best.formulation, *peers)
-    ]
-    if best not in solutions or not equals:
-        return None
-    error = _errors_of_best(best, {s: angles_between(solutions[best], solutions[s]) for s in equals})
-    how = f"{best.title}; its error is its distance from {' and '.join(s.title for s in equals[:3])}"
-    return ReferenceSolution(solutions[best], error, how)
+def _attitudes(found: Mapping[Task, Answer], task: Task) -> list[np.ndarray] | None:
+    answer = found.get(task, Answer())
+    return None if answer.trial is None or answer.problem else answer.trial.attitudes
 
 
 def _best_and_second(precision: str | int) -> tuple[Setting, Setting]:
-    """The best setting of a precision, and the second best, from which the error of the best is known."""
     return Setting(precision, hold_invariants=True), Setting(precision, _SECOND.get(precision))
-
-
-def _errors_of_best(best: Setting, distances: Mapping[Setting, np.ndarray]) -> np.ndarray:
-    """Errors (samples,), rad, of the best solution of a precision: its largest distance so far from equally
-    good ones.
-
-    Those in the same variables have begun with the same rounded values, and take the same steps until
-    invariants are first projected: such a distance alone was up to six times (13 once) too small.
-
-    Distances aren't scaled by the errors per step, as certificates do: a series keeps its
-    tolerance by orders of magnitude, so that rounding can dominate in both (near a separatrix, in quadruple
-    precision and at 1e-30, scaled errors were 70 times too small, held against 70 digits).
-    """
-    independent = best.precision in _SECOND or any(s.formulation != best.formulation for s in distances)
-    largest = np.max(list(distances.values()), axis=0) * (1.0 if independent else _SAME_VARIABLES)
-    return np.maximum(np.maximum.accumulate(largest), epsilon(best.precision))
 
 
 # --- measuring ----------------------------------------------------------------------------------------------
@@ -255,21 +194,43 @@ def _errors_of_best(best: Setting, distances: Mapping[Setting, np.ndarray]) -> n
 
 @dataclass
 class Row:
-    """Results for one setting, over a part of the horizon: its trial, the problem if there is none, and for
+    """Results for one setting, over a part of the motion: its trial, the problem if there is none, and for
     each process the CPU seconds per step (closed form: per sample), its own and the default setting's.
     """
 
     setting: Setting
     part: float
-    status: RowStatus = RowStatus.LEFT_OUT
-    problem: str = ""
-    trial: Trial | None = None
+    reference: ReferenceSolution
+    status: RowStatus
+    problem: str
+    trial: Trial | None
+    units: float  # that cost time: steps, or samples of a closed form
     seconds: list[tuple[float, float]] = field(default_factory=list)
 
     @property
     def measured(self) -> bool:
         """Whether its attitudes were computed to the end of its part."""
         return self.status in (RowStatus.MEASURED, RowStatus.SHORT)
+
+    def errors(self) -> tuple[np.ndarray, np.ndarray]:
+        """Attitude errors (samples,) of a measured setting, and the reference's own, rad."""
+        assert self.trial is not None
+        count = min(len(self.trial.attitudes[0]), len(self.reference.error))
+        mine, theirs = ([p[:count] for p in x.attitudes] for x in (self.trial, self.reference))
+        return angles_between(mine, theirs), self.reference.error[:count]
+
+    def cost(self, default: "Row") -> tuple[float, float, float]:
+        """CPU time per simulated second relative to the default's: median, least and largest over the
+        processes; nan if speed was not measured.
+        """
+        scale = (self.units / self.part) / (default.units / default.part)
+        ratios = [scale * own / base for own, base in self.seconds] or [math.nan]
+        return statistics.median(ratios), min(ratios), max(ratios)
+
+    @property
+    def cpu_seconds(self) -> float:
+        """CPU seconds over its part: steps (or samples) times a step's median cost."""
+        return self.units * statistics.median([own for own, _ in self.seconds] or [math.nan])
 
 
 @dataclass(frozen=True)
@@ -280,38 +241,9 @@ class Measurement:
     plan: Plan
     rows: list[Row]
     reference: ReferenceSolution
-    wide_reference: ReferenceSolution | None
+    wide_reference: ReferenceSolution
     processes: int
     seconds: float
-
-    def errors(self, row: Row) -> tuple[np.ndarray, np.ndarray]:
-        """Attitude errors (samples,) of a measured setting, and the reference's own, rad."""
-        assert row.trial is not None
-        reference = self.reference
-        if row.setting.precision == "quadruple" and self.wide_reference is not None:
-            reference = self.wide_reference
-        count = min(len(row.trial.attitudes[0]), len(reference.attitudes[0]))
-        mine, theirs = ([p[:count] for p in parts] for parts in (row.trial.attitudes, reference.attitudes))
-        return angles_between(mine, theirs), reference.error[:count]
-
-    def cost(self, row: Row) -> tuple[float, float, float]:
-        """CPU time per simulated second relative to the default's: median, least and largest over the
-        processes; nan if speed was not measured.
-        """
-        default = self.rows[0]
-        scale = (self._units(row) / row.part) / (self._units(default) / default.part)
-        ratios = [scale * own / base for own, base in row.seconds] or [math.nan]
-        return statistics.median(ratios), min(ratios), max(ratios)
-
-    def cpu_seconds(self, row: Row) -> float:
-        """CPU seconds of the setting over its part: steps (or samples) times a step's median cost."""
-        return self._units(row) * statistics.median([own for own, _ in row.seconds] or [math.nan])
-
-    def _units(self, row: Row) -> float:
-        """Number of units that cost time: steps, or samples of a closed form."""
-        if not row.setting.has_steps:
-            return self.plan.samples * row.part
-        return math.nan if row.trial is None else row.trial.steps
 
 
 def measure(
@@ -332,22 +264,33 @@ def measure(
     if repeats < 1:
         raise RigidsimError(f"tradeoff: --repeats {repeats} is not possible; at least 1 process is needed")
     begun = time.monotonic()
-    plan = make_plan(experiment, budget)
-    settings = every_setting(plan, full=full)
-    wide = {setting: setting.precision == "quadruple" and setting.has_steps for setting in settings}
-    tasks = {setting: plan.task(setting, _SINGLE * budget, wide=wide[setting]) for setting in settings}
+    plan = _plan(experiment, budget)
+    settings = _settings(plan, full=full)
+    wide = {s: s.precision == "quadruple" and s.has_steps for s in settings}
+    times = {True: plan.short_times, False: plan.times}
+    tasks = [Task(s, times[wide[s]], _SINGLE * budget) for s in settings]
     told(f"attitudes of {len(settings)} settings")
     done = 0
     with Worker(experiment) as worker:
-        found = _explored(experiment, worker, plan, list(tasks.values()), begun + _EXPLORING * budget)
-        rows = [_row(plan, tasks[setting], found, budget) for setting in settings]
-        if not rows[0].measured:
+        found = _explored(experiment, worker, plan.references(), tasks, begun + _EXPLORING * budget)
+        if problem := _answer(found, tasks[0], budget).problem:
             raise RigidsimError(
                 f"tradeoff: the default setting ({DEFAULT.title}), which costs are relative to, could not be "
-                f"measured: {rows[0].problem}"
+                f"measured: {problem}"
             )
         told("the reference")
-        reference, wide_reference = best_reference(plan, found)
+        reference, of_wide = _references(plan, found)
+        rows = []
+        for task in tasks:
+            answer = _answer(found, task, budget)
+            part = plan.short if wide[task.setting] else plan.part
+            status = RowStatus.MEASURED if part >= plan.part else RowStatus.SHORT
+            if answer.problem:
+                status = RowStatus.FAILED if task in found else RowStatus.LEFT_OUT
+            units = math.nan if answer.trial is None else answer.trial.steps
+            units = units if task.setting.has_steps else plan.samples * part
+            against = of_wide if wide[task.setting] else reference
+            rows.append(Row(task.setting, part, against, status, answer.problem, answer.trial, units))
         for repeat in range(repeats):
             until = begun + 1.1 * budget
             if repeat and time.monotonic() > until:
@@ -358,15 +301,14 @@ def measure(
                 continue
             with Worker(experiment) as fresh:
                 done += _timed(fresh, plan, rows, repeat, until)
-    return Measurement(experiment, plan, rows, reference, wide_reference, done, time.monotonic() - begun)
+    return Measurement(experiment, plan, rows, reference, of_wide, done, time.monotonic() - begun)
 
 
 def _explored(
-    experiment: Experiment, worker: Worker, plan: Plan, tasks: list[Task], deadline: float
+    experiment: Experiment, worker: Worker, references: list[Task], tasks: list[Task], deadline: float
 ) -> dict[Task, Answer]:
     """Attitudes of settings and references, by two processes: what one can't do without comes first."""
     found: dict[Task, Answer] = {}
-    references = plan.references
     left = iter([task for task in tasks[1:] if task not in references])
 
     def explore(worker: Worker, own: list[Task]) -> None:
@@ -383,16 +325,23 @@ def _explored(
     return found
 
 
-def _row(plan: Plan, task: Task, found: Mapping[Task, Answer], budget: float) -> Row:
-    """The row of a setting whose attitudes were computed, or were not."""
-    part = plan.part if task.times == plan.times else plan.short
-    answer = found.get(task)
-    if answer is None:
-        problem = f"left out: the budget of {budget:g} s was used up before its turn"
-        return Row(task.setting, part, problem=problem)
-    status = RowStatus.MEASURED if part >= plan.part else RowStatus.SHORT
-    status = RowStatus.FAILED if answer.problem else status
-    return Row(task.setting, part, status, answer.problem, answer.trial)
+def _answer(found: Mapping[Task, Answer], task: Task, budget: float) -> Answer:
+    left_out = f"left out: the budget of {budget:g} s was used up before its turn"
+    return found.get(task, Answer(problem=left_out))
+
+
+def _references(plan: Plan, found: Mapping[Task, Answer]) -> tuple[ReferenceSolution, ReferenceSolution]:
+    """The reference, and that of quadruple precision. Raises ``RigidsimError`` if there is none."""
+    exact = _attitudes(found, plan.references()[0]) if plan.exact else None
+    if exact is not None:
+        own = np.full(len(plan.times), 10.0 ** (2 - LEAST_DIGITS))  # two digits are left to rounding
+        best = ReferenceSolution(exact, own, f"closed form to {LEAST_DIGITS} digits")
+        return best, best
+    of_all = _reference(found, plan.times, ("quadruple", "extended", "double"))
+    if of_all is None:
+        what = "no reference could be integrated within the budget; give a larger --budget"
+        raise RigidsimError(f"tradeoff: {what}")
+    return of_all, _reference(found, plan.short_times, (LEAST_DIGITS,)) or of_all
 
 
 def _timed(worker: Worker, plan: Plan, rows: list[Row], repeat: int, until: float) -> bool:
@@ -410,11 +359,9 @@ def _timed(worker: Worker, plan: Plan, rows: list[Row], repeat: int, until: floa
         if answer is None:
             break
         found += [(row, answer.seconds)] * (not answer.problem)
-    bases = [seconds for row, seconds in found if row is default]
-    if bases:
-        base = statistics.median(bases)
-        default.seconds.append((base, base))
-        for row, seconds in found:
-            if row is not default:
-                row.seconds.append((seconds, base))
+    base = statistics.median([seconds for row, seconds in found if row is default] or [math.nan])
+    default.seconds += [(base, base)] * (not math.isnan(base))
+    for row, seconds in found:
+        if row is not default:
+            row.seconds.append((seconds, base))
     return len(found) == len(turns)

@@ -12,12 +12,11 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
-from typing import Any, Self
+from typing import Self
 
 import mpmath
 import numpy as np
@@ -74,17 +73,23 @@ def _speed(experiment: Experiment, task: Task, times: list[mpmath.mpf]) -> Answe
     most = task.speed_steps or 1
     scene = trial_scene(experiment, task.setting, times)
     prepared = prepare_scene(experiment, scene, tolerance=task.setting.tolerance)
-    one_pass: Callable[[int], Any]
     if prepared.has_steps:
         corrected = assemble(prepared).steps()
         start = corrected.boundary()
-        one_pass = lambda steps: corrected.back_to(start) or corrected.skip(steps)  # noqa: E731
+
+        def one_pass(steps: int) -> None:
+            corrected.back_to(start)
+            corrected.skip(steps)
+
         one_pass(min(most, _LONGEST_WARMING))  # charts are compiled when first needed
         count = min(32, most)
     else:
         closed, clock, precision = closed_form_of(scene), prepared.clock, prepared.precision
         rows = np.resize(clock.internal(0, clock.count), _CLOSED_ROWS[precision.narrow])
-        one_pass = lambda _: closed.states(prepared.system, precision, rows, clock.start)  # noqa: E731
+
+        def one_pass(steps: int) -> None:
+            closed.states(prepared.system, precision, rows, clock.start)
+
         count = most = len(rows)
     begun, passes = time.process_time(), list[float]()
     while not passes or time.process_time() - begun <= task.patience:
