@@ -59,6 +59,7 @@ class Load(SceneLoad):
 
     Attributes:
         title: name used in reasons and messages.
+        remark: what readers should know of it besides its keys.
         reads: states that it must find: "attitude", "vertical", "flight".
         conservative: whether it has a potential that doesn't depend on time.
         orbit, table: what its source is on; all loads on one orbit or table share its states.
@@ -84,7 +85,7 @@ class Load(SceneLoad):
     title = "load"
     reads: frozenset[str] = frozenset()
     conservative = False
-    described = "a load given from Python"
+    remark: str = ""
     orbit: KeplerOrbit | None = None
     table: TabulatedOrbit | None = None
     corotating_orbit: KeplerOrbit | None = None
@@ -242,13 +243,6 @@ class Load(SceneLoad):
         return None
 
     # --- for readers ----------------------------------------------------------------------------------------
-
-    def told(self, scene: Scene) -> str:
-        """What it is in a reader's terms, in one sentence for ``check``, ``plan`` and ``info``: sizes at the
-        start with their units, and known bodies by name.
-        """
-        purpose = ((self.Fields or type(self)).__doc__ or "given from Python").partition("\n")[0]
-        return f"{self.title}: {purpose}"
 
     def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
         """Values of it that are allowed, but probably mean something else.

@@ -20,7 +20,7 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.model.carriers import Carrier
-from rigidsim.model.formulations.formulation import Requirements
+from rigidsim.model.formulations.formulation import ModelPlan, Requirements
 from rigidsim.model.formulations.quaternion import quaternion_states
 from rigidsim.model.kinematics import in_common_unit
 from rigidsim.model.load import Load, Term, force_terms, loads_of, torque_terms
@@ -105,6 +105,25 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
         speed += min(pushed.most, _CYCLE * peak * pushed.period, float(np.sqrt(2 * peak * room)))
     sizes = ((energy, scaling.energy), (speed, scaling.speed))
     return Drive(*(context.ldexp(context.mpf(value), exponent) for value, exponent in sizes))
+
+
+def effect_at_start(plan: ModelPlan, loads: Sequence[Load]) -> list[tuple[str, float, str]]:
+    """Torque and force of loads together at the start: what it is, its size and its unit."""
+    scene, m = plan.scene, probe(plan.scene, plan.requirements, plan.loads)
+    names, start = start_of(m, plan.loads)
+    unit, sizes = m.scaling, []
+    given = [("torque", torque_terms, 2.0**unit.energy, "N m")]
+    if m.velocity is not None:
+        given.append(
+            ("force", force_terms, 2.0 ** (unit.speed - unit.time) * float(m.carried(scene.body.mass)), "N")
+        )
+    for what, terms_of, size, symbol in given:
+        if terms := [term for load in loads for term in terms_of(load, m)]:
+            parts = [hy.sum([float(vector[i]) * x for vector, x in terms]) for i in range(3)]
+            function = hy.cfunc(parts, list(hy.make_vars(*names)), compact_mode=True)
+            values = function(start, time=float(scene.context.ldexp(scene.start, -unit.time)))
+            sizes.append((what, float(np.linalg.norm(values)) * size, symbol))
+    return sizes
 
 
 def probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> Mechanics:

@@ -316,7 +316,7 @@ def _oddness(load: Load, quaternion: np.ndarray, here: float, there: float) -> P
     shown = ", ".join(f"{x:.3g}" for x in quaternion)
     return Problem(
         next(odd, "loads"),
-        f"{load.described} depends on the sign of the quaternion: at q = [{shown}] a part of it is "
+        f"{load.title} depends on the sign of the quaternion: at q = [{shown}] a part of it is "
         f"{here:.3g} (in internal units), at -q, which is the same attitude, {there:.3g}; use products such "
         "as qw*qx, or say where it jumps: sign(qw)*qx",
     )

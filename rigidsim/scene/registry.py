@@ -127,7 +127,7 @@ class SceneLoad:
 
     Attributes:
         Fields: its keys in a config; None for a load that only Python gives.
-        described: description with an article, for sentences.
+        title: name used in reasons and messages.
         uniform_field: acceleration (mpf, m/s^2, space axes) of a field that is the same everywhere; such
             loads add up to the scene's gravity. None for all others.
         axes: what the space axes are in its own equations; None if these hold in any axes.
@@ -143,7 +143,7 @@ class SceneLoad:
     """
 
     Fields: ClassVar[type[LoadFields] | None] = None
-    described: str = "a load"
+    title: str = "load"
     uniform_field: Vector | None = None
     axes: str | None = None
     epoch: Epoch | None = None

@@ -215,7 +215,7 @@ def _with_loads(begun: Setting, samples: SampleTimes, source: str) -> Scene:
         raise _fail("body", "mass", "missing; uniform_gravity needs it")
     acting = [load for load in resolved if load.acts() and load.uniform_field is None]
     events = resolve_events(setting)
-    readers = [(load.described, formula) for load in acting for formula in load.formulas()]
+    readers = [(load.title, formula) for load in acting for formula in load.formulas()]
     readers += [(f"event {event.name}", event.expression) for event in events]
     states = carried_states(resolve_states(setting), readers, config.output.record)
     read = names_used(*(formula for _, formula in readers), *(state.derivative for state in states))

@@ -71,7 +71,7 @@ def summarise(
         body=body_of(scene),
         start=start_of(scene),
         time=span_of(scene),
-        loads=told_loads(prepared),
+        loads=told_loads(prepared, sizes=False),
         bit_for_bit=_bit_for_bit(prepared, progress, attributes.mixed_provenance),
         provenance=attributes.of_use(Use.REPEATED),
         advice=advice_on(found),

@@ -1,13 +1,19 @@
 """How a config was understood, as values to show, and what in it is suspicious."""
 
+from collections.abc import Sequence
 from typing import Any
 
+from rigidsim.model.formulations.formulation import ModelPlan
 from rigidsim.model.load import Load, loads_of
+from rigidsim.model.load_estimate import effect_at_start
+from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.plausibility import about_named_strength, about_radius
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, working_bits
 from rigidsim.scene.cautions import Caution, WarningCode
-from rigidsim.scene.readable import TimeWords
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.fields import ConfigTable
+from rigidsim.scene.readable import TimeWords, number_text
 from rigidsim.scene.registry import LOADS
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
@@ -20,6 +26,9 @@ from rigidsim.scene.suspicions import (
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.store.summary import Span, Start, UnderstoodBody
 from rigidsim.store.summary_parts import Three
+
+_DIGITS = 6
+_PLAIN = ("0", "False", "True")
 
 
 def body_of(scene: Scene) -> UnderstoodBody:
@@ -65,12 +74,69 @@ def span_of(scene: Scene) -> Span:
     )
 
 
-def told_loads(prepared: InitialValueProblem) -> tuple[str, ...]:
-    """The loads and user-defined states in a reader's terms, one sentence for each."""
-    plan = prepared.system.plan
-    locked = [x for found in plan.scene.tabled.values() for x in found if not x.acts()]
-    told = [load.told(plan.scene) for load in [*plan.loads, *locked] if isinstance(load, Load)]
-    return tuple(told + [state.told for state in plan.scene.states])
+def told_loads(prepared: InitialValueProblem, *, sizes: bool = True) -> tuple[str, ...]:
+    """The loads and user-defined states, one sentence for each: keys, and torque and force at the start.
+
+    Args:
+        sizes: whether torque and force are worked out, for which they are compiled.
+    """
+    plan, scene = prepared.system.plan, prepared.system.plan.scene
+    pairs = zip(scene.config.loads, scene.given_loads, strict=True)
+    rows: list[tuple[str, Any, Any]] = [(getattr(x, "kind", ""), x, load) for x, load in pairs]
+    for table, found in scene.tabled.items():
+        pairs = zip(getattr(scene.config, table), found, strict=True)
+        rows += [(table[:-1], fields, load) for fields, load in pairs]
+    for key, kind in LOADS["body"].items():
+        rows += [
+            (key, getattr(scene.config.body, key), load) for load in scene.loads if isinstance(load, kind)
+        ]
+    said = []
+    for what, fields, load in rows:
+        uniform = load.uniform_field is not None  # all of which are one load
+        of = [
+            x
+            for x in plan.loads
+            if (isinstance(x, UniformGravity) if uniform else load is x or load is x.beside)
+        ]
+        name = getattr(fields, "name", None)
+        text = f"{what} {name}: {_value(fields)}" if name else f"{what}: {_value(fields)}"
+        text += f"; {load.remark}" if load.remark else ""
+        said.append(text + (_effect(plan, of) if sizes and of and not any(x.wide for x in of) else ""))
+    for load in prepared.python_loads:
+        doc = (type(load).__doc__ or "given from Python").partition("\n")[0]
+        said.append(f"{load.title}: {doc}" + (_effect(plan, [load]) if sizes else ""))
+    return (*said, *(state.told for state in scene.states))
+
+
+def _effect(plan: ModelPlan, loads: Sequence[Load]) -> str:
+    """Torque and force at the start; empty for loads without any."""
+    found = effect_at_start(plan, loads)
+    said = [f"{what} {number_text(size, _DIGITS)} {unit}" for what, size, unit in found]
+    return f"; at the start {', '.join(said)}" if said else ""
+
+
+def _value(value: Any) -> str:
+    """A value of a config; of a table the keys, but for zeros that weren't given."""
+    if isinstance(value, ExactNumber):
+        return f"{number_text(float(value.in_its_unit), _DIGITS)} {value.unit or value.assumed}".rstrip()
+    if isinstance(value, ConfigTable):
+        keys = [key for key in type(value).model_fields if key not in ("kind", "name")]
+        texts = {key: _part(x) for key in keys if (x := getattr(value, key)) is not None}
+        given = value.model_fields_set
+        return ", ".join(f"{key} {x}" for key, x in texts.items() if key in given or x not in _PLAIN)
+    if isinstance(value, dict):
+        return f"of {len(value)} terms"
+    if not isinstance(value, list):
+        return " ".join(str(value).split())
+    parts = [_value(x) for x in value]
+    units = {x.partition(" ")[2] for x in parts}
+    if len(units) != 1 or not all(isinstance(x, ExactNumber) for x in value):
+        return f"[{', '.join(parts)}]"
+    return f"[{', '.join(x.partition(' ')[0] for x in parts)}] {units.pop()}".rstrip()
+
+
+def _part(value: Any) -> str:
+    return f"({_value(value)})" if isinstance(value, ConfigTable) else _value(value)
 
 
 def time_words(scene: Scene) -> TimeWords:

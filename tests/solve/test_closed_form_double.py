@@ -93,7 +93,7 @@ def test_a_top_and_a_throw_in_closed_form() -> None:
     ("table", "message"),
     [
         ('[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 1\nposition = [1, 0, 0]',
-         "a gravity-gradient load has no closed form"),
+         "gravity_gradient has no closed form"),
         ('[[events]]\nname = "e"\nexpression = "wx"', r"remove \[\[events\]\]"),
         ("hold_invariants = true", ""),
         ('formulation = "euler_angles"', ""),

@@ -9,22 +9,16 @@ from pydantic import Field
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import span_words, value_text
 from rigidsim.model.names import written
 from rigidsim.model.rotations import Symbolic, apply, transpose
-from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm, parallel
-from rigidsim.scene.arithmetic import apply as apply_numbers
-from rigidsim.scene.arithmetic import transpose as transposed
-from rigidsim.scene.attitude import rotation_matrix
+from rigidsim.scene.arithmetic import Vector, cross, diagonal, parallel
 from rigidsim.scene.expressions.tree import (
     Constant,
     Expression,
-    evaluate,
     names_used,
     states_read,
 )
 from rigidsim.scene.fields import Formula, Metre, Triple
-from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.registry import LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene
 
@@ -99,39 +93,6 @@ class Applied(Load):
         found = states_read(*self.components)
         return found | ({"attitude"} if crosses else set()) | ({"flight"} if self.pushes else set())
 
-    @property
-    def described(self) -> str:  # type: ignore[override]
-        return f"a {self.title} given by expressions"
-
-    def told(self, scene: Scene) -> str:
-        context, values = scene.context, start_values(scene)
-        found = [evaluate(component, values, context) for component in self.components]
-        texts = ", ".join(_brief(component.text) for component in self.components)
-        said = f"{self.title} [{texts}] {self.unit} in {self.frame} axes"
-        size = norm(context, found)
-        if size == 0:
-            return f"{said}: zero at the start"
-        return f"{said}: {value_text(size, self.unit)} at the start{self._effect(scene, found)}"
-
-    def _effect(self, scene: Scene, found: Vector) -> str:
-        """What a torque or force of this size at the start would do, in words."""
-        context = scene.context
-        turning = found
-        if self.title == "force":
-            if self.frame == "space":
-                turning = apply_numbers(transposed(rotation_matrix(scene.quaternion)), found)
-            turning = cross(self.arm, turning)
-        size = norm(context, turning)
-        momentum = norm(context, apply_numbers(scene.body.inertia, scene.angular_velocity))
-        said = ""
-        if self.pushes:
-            said = f", {value_text(norm(context, found) / scene.body.mass, 'm/s^2')}"
-        if self.title == "force" and size:
-            said += f", torque {value_text(size, 'N m')}"
-        if size and momentum:
-            said += f", which in {span_words(momentum / size)} would add up to the angular momentum"
-        return said
-
     def _in_body(self, m: Kinematics) -> list[Symbolic]:
         found = written(m, self.components)
         return apply(transpose(m.matrix), found) if self.frame == "space" else found
@@ -152,10 +113,6 @@ class Applied(Load):
         acting = [not _vanishes(component) for component in self.components]
         turns = (lambda n: n != 0) if self.title == "torque" else (lambda n: abs(n) != 1)
         return any(a and turns(n) for a, n in zip(acting, axis, strict=True))
-
-
-def _brief(text: str) -> str:
-    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
 
 
 def _vanishes(component: Expression) -> bool:

@@ -11,14 +11,12 @@ The axes turn about the pole at a constant rate; a field without orders above 0 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import length_text, span_words, value_text
 from rigidsim.model.loads.attractor_keys import AttractorFieldTable, coefficients_of
 from rigidsim.model.loads.central_gravity import CentralGravity, CentralGravityFields
 from rigidsim.model.loads.figure_in_flight import refuse_inside
@@ -28,7 +26,6 @@ from rigidsim.scene.arithmetic import Vector, unit_vectors
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.tracing.numbers import plain
 
 
 @register_load(beside="gravity_field")
@@ -49,7 +46,6 @@ class AttractorField(Load):
     context: Any
 
     title = "gravity_field"
-    described = "the gravity field of an attracting body"
     reads = frozenset({"flight"})
     wide = True
 
@@ -123,23 +119,6 @@ class AttractorField(Load):
 
     def fastest_rate(self, scene: Scene) -> Any:
         return scene.context.zero if self.conservative else abs(self.field.rate)
-
-    def told(self, scene: Scene) -> str:
-        context, near, total = scene.context, self.beside.nearest_approach(scene), scene.context.zero
-        for (n, order, _), value in self.field.coefficients.items():
-            most = context.sqrt(context.mpf(math.factorial(n + order)) / math.factorial(n - order))
-            total += abs(value) * most * (n + 1) * (self.field.radius / near) ** n
-        share = float(plain(total * self.beside.strength / near**2))
-        radius = length_text(float(plain(self.field.radius)))
-        count, degree = len(self.field.coefficients), self.field.degree
-        turn = ""
-        if not self.conservative:
-            turn = f", turning once in {span_words(abs(2 * context.pi / self.field.rate))}"
-        return (
-            f"gravity field of the attracting point of [[loads]] number {self.number}, degree {degree} "
-            f"({count} coefficient{'s' * (count > 1)}, radius {radius}){turn}; "
-            f"acceleration up to about {value_text(share, 'm/s^2')}"
-        )
 
 
 def _by_degree(table: AttractorFieldTable) -> list[tuple[int, str]]:

@@ -11,7 +11,6 @@ from pydantic import Field
 from rigidsim.model.gradient import tidal_range
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import length_text, reach_text, source_text, span_words, value_text
 from rigidsim.model.loads.attractor_keys import AttractorFieldTable
 from rigidsim.model.loads.kernel_attractor import KernelAttractor
 from rigidsim.model.loads.point_attraction import (
@@ -35,7 +34,7 @@ from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import BodyName, GravitationalParameter, Metre, Rate, Triple
 from rigidsim.scene.orbit_keys import Orbit
 from rigidsim.scene.orbits import attracting_body
-from rigidsim.scene.point_masses import closest, kepler_reach
+from rigidsim.scene.point_masses import closest
 from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
 
@@ -91,7 +90,6 @@ class CentralGravity(PointAttraction):
     position: Vector  # space axes, m (mpf)
     Fields = CentralGravityFields
     title = "central_gravity"
-    described = "a central-gravity load"
     reads = frozenset({"attitude", "flight"})
     conservative = True
 
@@ -190,21 +188,6 @@ class CentralGravity(PointAttraction):
             reach = min(farthest, distance + swiftest * horizon) + fed * horizon
             return norm(context, self.position) + reach, swiftest + fed
         return norm(context, scene.position) + (swiftest + fed) * horizon, swiftest + fed
-
-    def told(self, scene: Scene) -> str:
-        context, strength = scene.context, self.gravitational_parameter
-        offset, distance, _ = self._start(scene)
-        source = f"{source_text(strength)}, {reach_text(strength, distance)} at the start"
-        least = self.nearest_approach(scene)
-        at, largest = self.nearest_approach(scene), value_text(self.amplitude(scene), "N m")
-        least, farthest = kepler_reach(context, offset, scene.velocity or [], strength)
-        path = f"unbound, no nearer than {length_text(float(least))}"
-        if farthest is not None:
-            period = span_words(2 * context.pi * context.sqrt(((least + farthest) / 2) ** 3 / strength))
-            path = f"on an orbit of {length_text(float(least), float(farthest))}, period {period}"
-        # an orbit that all but meets the point has no bound that says anything
-        torque = f"up to {largest}" if least >= at * _ROUNDED else f"{largest} at {length_text(float(at))}"
-        return f"central gravity of {source}, {path}; torque {torque}"
 
     def cautions(self, fields: CentralGravityFields, where: str, scene: Scene) -> Iterator[Caution]:
         given, name = fields.gravitational_parameter, fields.source

@@ -81,7 +81,6 @@ class Drag(SurfaceLoad):
     law: Expression | None = None
     Fields = DragFields
     title = "drag"
-    described = "drag"
 
     @classmethod
     def resolve(cls, fields: DragFields, around: Setting) -> Drag:
@@ -139,14 +138,9 @@ class Drag(SurfaceLoad):
 class DragInThermosphere(Drag):
     """Drag in NRLMSISE-00, which ends where the network of it does."""
 
-    described = "drag in NRLMSISE-00"
-
     def range_ends(self, m: Kinematics) -> list[tuple[str, Symbolic]]:
         why = f"the altitude fell below {LEAST:g} km, from which NRLMSISE-00 is known here"
         return [(why, (height(m) - LEAST) / LEAST + 2.0**-20)]  # 14 cm: a run may start at the limit
-
-    def _words(self) -> str:
-        return "drag in NRLMSISE-00"
 
 
 def _altitudes(scene: Scene) -> tuple[Any, Any] | None:

@@ -110,10 +110,3 @@ class EarthField:
     def within(self, far: Any) -> bool:
         """Whether a distance from the centre is inside the Earth."""
         return bool(far < _LEAST * self.harmonics.radius)
-
-    @property
-    def described(self) -> str:
-        """What it is, for readers."""
-        degree = self.harmonics.degree
-        which = "degree 1, a tilted dipole" if degree == 1 else f"degree {degree}"
-        return f"the IGRF-14 of {self.epoch.calendar()[:10]} ({which}), which turns with the Earth"

@@ -9,7 +9,6 @@ from pydantic import Field
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Term
-from rigidsim.model.load_words import span_words
 from rigidsim.model.loads.magnetic_field import InMagneticField
 from rigidsim.model.loads.magnetic_keys import MagneticFieldFields, numbers
 from rigidsim.scene.arithmetic import (
@@ -25,10 +24,8 @@ from rigidsim.scene.arithmetic import (
 )
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import InUnit, Metre, NotNegative, Positive, Triple
-from rigidsim.scene.readable import number_text
 from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.tracing.numbers import plain
 
 Conductivity = Annotated[ExactNumber, InUnit("S/m")]
 MagneticTensor = Annotated[ExactNumber, InUnit("S m^4")]
@@ -68,7 +65,6 @@ class EddyCurrents(InMagneticField):
     moments: Vector  # of M, body axes, S m^4 (mpf)
     Fields = EddyCurrentsFields
     title = "eddy_currents"
-    described = "a load of eddy currents"
     unaveraged = "the torque of eddy currents has no average", "leave it out, use viscous_torque"
 
     @classmethod
@@ -126,17 +122,6 @@ class EddyCurrents(InMagneticField):
 
     def amplitude(self, scene: Scene) -> Any:
         return scene.context.zero  # it only removes energy
-
-    def told(self, scene: Scene) -> str:
-        """See ``Load``; the time is the shortest of a spin across the field, about any body axis."""
-        context, inertia = scene.context, scene.body.inertia
-        damping = max(self.moments) * self._size(scene) ** 2
-        moments = ", ".join(number_text(float(plain(x)), 4) for x in self.moments)
-        told = f"eddy currents, magnetic tensor {moments} S m^4, in {self._described_field(scene)}"
-        if damping == 0:
-            return told
-        span = span_words(context.minimum([inertia[i][i] for i in range(3)]) / damping)
-        return f"{told}: damps a spin across the field by 1/e in {span} or more"
 
 
 def _of_tensor(given: list[ExactNumber], fields: EddyCurrentsFields, around: Setting) -> Vector:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.load_words import length_text, span_words
+from rigidsim.model.load_words import span_words
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.kernels.reading import Sight
@@ -94,12 +94,6 @@ def _raising(config: Config, names: list[str] | None) -> tuple[int, ...]:
     return found
 
 
-def causes(names: list[str], spins: bool) -> str:
-    """What distorts the body, in words."""
-    tides = [f"tides of {', '.join(names)}"] if names else []
-    return " and ".join([*tides, *(["the spin"] if spins else [])])
-
-
 class ElasticEffects(SceneLoad):
     """What a scene can be without of an elastic body."""
 
@@ -130,12 +124,6 @@ class ElasticEffects(SceneLoad):
 def _of_sources(config: Config, raising: tuple[int, ...]) -> str:
     names = [next(iter(names_of(config.loads[n])), f"[[loads]] number {n + 1}") for n in raising]
     return f"tides of {', '.join(names)}" if names else "tides"
-
-
-def told_elasticity(what: str, love: Any, radius: Any) -> str:
-    """What it does, and its numbers, in a reader's terms."""
-    size = length_text(float(plain(radius)))
-    return f"elasticity: {what}; Love number {float(plain(love)):.6g}, radius {size}"
 
 
 def refuse_delay(delay: Any, turned: float) -> None:

@@ -25,15 +25,12 @@ from rigidsim.model.gradient import GradientSource
 from rigidsim.model.inertia import ConstantInertia, MassDistribution
 from rigidsim.model.kinematics import Kinematics, in_common_unit, inertia_times
 from rigidsim.model.load import Load, Term, loads_of
-from rigidsim.model.load_words import span_words, value_text
 from rigidsim.model.loads.elastic_keys import (
     ElasticEffects,
     about_keys,
-    causes,
     elastic_values,
     fault,
     refuse_delay,
-    told_elasticity,
 )
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic, transpose
@@ -68,7 +65,6 @@ class Elasticity(ElasticEffects, Load):
     spins: bool = True  # whether the spin distorts, too
 
     title = "elasticity"
-    described = "a body that tides and its spin distort"
     wide = True  # some hundreds of expressions
     changes = "the moments of an elastic body vary"
     conservative = True  # its work is told by ``supplied_power``
@@ -327,19 +323,6 @@ class Elasticity(ElasticEffects, Load):
         return hy.sum(terms)
 
     # --- what readers are told ------------------------------------------------------------------------------
-
-    def told(self, scene: Scene) -> str:
-        tensor = self.begun(scene)[0]
-        largest = max(abs(float(plain(x))) for row in tensor for x in row)
-        share = largest / float(plain(max(scene.body.principal_moments)))
-        names = [scene.config.loads[n].name or f"[[loads]] number {n + 1}" for n in self.raising]
-        late = f", {span_words(plain(self.delay))} late" if self.delay != 0 else ", without delay"
-        what = causes(names, self.spins) + " distort the tensor" + late
-        return told_elasticity(what, self.love_number, self.radius) + (
-            f"; up to {value_text(largest, 'kg m^2')} at the start, {share:.3g} of the largest moment; the "
-            "moments given contain the distortion by a spin of "
-            f"{value_text(plain(self.known_rate(scene)), 'rad/s', 8)}"
-        )
 
 
 def _rounded(m: Kinematics, matrix: Matrix) -> Matrix:

@@ -66,7 +66,6 @@ class FluidCore(Load):
     rate: Vector | None
 
     title = "fluid core"
-    described = "a fluid core"
     conservative = True  # what friction takes is told by ``supplied_power``
     loose = True  # see ``carriers.Loose``
     nothing = {"moment": 0}  # noqa: RUF012
@@ -245,27 +244,6 @@ class FluidCore(Load):
             yield Caution(WarningCode.FRICTION_STIFF, text + "nearly the same")
 
     # --- what readers are told ------------------------------------------------------------------------------
-
-    def told(self, scene: Scene) -> str:
-        body, context = scene.body, scene.context
-        part = plain(self.polar) / max(plain(x) for x in body.principal_moments)
-        said = f"fluid core: {context.nstr(part, 6)} of the body's largest moment"
-        said += f", flattened by {_text(self.flattening)}" if self.flattening != 0 else ", spherical"
-        if self.friction != 0:
-            time = plain(self.polar / self.friction)
-            said += f"; friction would take its rate to the mantle's in {value_text(time, 's')}"
-        else:
-            said += "; without friction"
-        slip = norm(
-            context,
-            [plain(x) - plain(y) for x, y in zip(self.at_start(scene), scene.angular_velocity, strict=True)],
-        )
-        same = (
-            f"begins {value_text(slip, 'rad/s')} from the mantle's rate"
-            if slip
-            else "begins at the mantle's rate"
-        )
-        return f"{said}; {same}"
 
     def pictured(self) -> dict[str, Any]:
         return {

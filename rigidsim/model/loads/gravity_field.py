@@ -24,7 +24,7 @@ from rigidsim.model.gradient import GradientSource
 from rigidsim.model.harmonics import Harmonics, Series, polynomial, turning
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import length_text, value_text
+from rigidsim.model.load_words import length_text
 from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.model.turning_harmonics import by_powers
 from rigidsim.scene.arithmetic import Vector, across, cross, negligible, norm, parallel, unit_vectors
@@ -74,7 +74,6 @@ class FieldAttraction(Load):
     number: int
 
     title = "gravity_field"
-    described = "the body's gravity field"
     unaveraged = (
         "the gravity field of degree 3 and more has no average, which the gradient alone has",
         "set degree = 2",
@@ -241,16 +240,6 @@ class FieldAttraction(Load):
 
     def amplitude(self, scene: Scene) -> Any:
         return 2 * self._size(scene)
-
-    def told(self, scene: Scene) -> str:
-        count, radius = len(self.coefficients), length_text(float(plain(self.field.radius)))
-        which = f"degree {LEAST}" if self.degree == LEAST else f"degrees {LEAST} to {self.degree}"
-        from_where = f", from {self.field.described}" if self.field.described else ""
-        return (
-            f"gravity field of the body, {which} ({count} coefficient{'s' * (count > 1)}, radius {radius}"
-            f"{from_where}), on which the source of [[loads]] number {self.number} acts; energy up to "
-            f"{value_text(plain(self._size(scene)), 'J')}"
-        )
 
     @staticmethod
     def effect_parts(fields: AttractingFields) -> Iterator[EffectPart]:

@@ -13,7 +13,6 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.gradient import GradientSource, gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, SourcePlace, Term
-from rigidsim.model.load_words import sides_text, source_text, value_text
 from rigidsim.model.loads.point_attraction import MovingGradient, kernel_strength, positive_strength
 from rigidsim.model.loads.source_figure import FigureFields
 from rigidsim.model.orbit_planes import OrbitPlane
@@ -70,7 +69,6 @@ class GravityGradient(GradientSource, Load):  # type: ignore[override]
 
     Fields = GravityGradientFields
     title = "gravity_gradient"
-    described = "a gravity-gradient load"
     reads = frozenset({"attitude"})
     has_source = True
 
@@ -145,6 +143,10 @@ class GravityGradient(GradientSource, Load):  # type: ignore[override]
         return orbit if orbit is not None and orbit.circular and orbit.fixed_plane else None
 
     @property
+    def remark(self) -> str:  # type: ignore[override]
+        return "" if self.table is None else self.table.described
+
+    @property
     def plane(self) -> OrbitPlane | None:  # type: ignore[override]
         return self.placement.plane
 
@@ -210,12 +212,6 @@ class GravityGradient(GradientSource, Load):  # type: ignore[override]
 
     def fastest_rate(self, scene: Scene) -> Any:
         return self.placement.fastest_rate(scene.context)
-
-    def told(self, scene: Scene) -> str:
-        strength, largest = self.gravitational_parameter, value_text(self.amplitude(scene), "N m")
-        where = self.placement.told(scene.context, strength)
-        seen = sides_text(self.placement.at_start(scene))
-        return f"gravity gradient of {source_text(strength)}, {where}; {seen}; torque up to {largest}"
 
     def cautions(self, fields: GravityGradientFields, where: str, scene: Scene) -> Iterator[Caution]:
         given = fields.gravitational_parameter

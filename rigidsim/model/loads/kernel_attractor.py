@@ -18,7 +18,6 @@ from typing import Any
 from rigidsim.model.gradient import tidal_range
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Term
-from rigidsim.model.load_words import reach_text, source_text, value_text
 from rigidsim.model.loads.point_attraction import PointAttraction
 from rigidsim.model.placements.kernel_body import PlacedByKernel, kernel_body
 from rigidsim.model.plausibility import about_named_strength, about_start, named_body
@@ -36,7 +35,6 @@ class KernelAttractor(PointAttraction):
 
     gravitational_parameter: Any
     placement: PlacedByKernel
-    described = "a central-gravity load"
     title = "central_gravity"
     reads = frozenset({"attitude", "flight"})
     wide = True
@@ -145,11 +143,3 @@ class KernelAttractor(PointAttraction):
             text = f'[body] host: given "{host}", whose own gravity no load has, so that only what others do '
             text += f'to it acts; add central_gravity with source = "{host}", unless that is meant'
             yield Caution(WarningCode.HOST_WITHOUT_GRAVITY, text)
-
-    def told(self, scene: Scene) -> str:
-        far, host = self._distance(scene), self.placement.sight.host
-        origin = f', as felt in the falling frame of "{host}"' if host else ""
-        where = f"where {self.placement.ephemeris.kernel.name} has it"
-        where += f", {reach_text(self.strength, far)} at the start"
-        torque = value_text(self.amplitude(scene), "N m")
-        return f"central gravity of {source_text(self.strength)}, {where}{origin}; torque up to {torque}"

@@ -10,15 +10,13 @@ import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Term
-from rigidsim.model.load_words import value_text
 from rigidsim.model.loads.magnetic_field import InMagneticField
 from rigidsim.model.loads.magnetic_keys import MagneticDipoleFields, numbers
 from rigidsim.model.names import written
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, across, cross, diagonal, norm, unit_vectors
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions.tree import Constant, Expression, evaluate, states_read
-from rigidsim.scene.initial_values import start_values
+from rigidsim.scene.expressions.tree import Constant, Expression, states_read
 from rigidsim.scene.readable import number_text
 from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
@@ -32,7 +30,6 @@ class MagneticDipole(InMagneticField):
     moment: Vector  # m, body axes, A m^2 (mpf)
     Fields = MagneticDipoleFields
     title = "magnetic_dipole"
-    described = "a magnetic dipole"
 
     @classmethod
     def resolve(cls, fields: MagneticDipoleFields, around: Setting) -> MagneticDipole:
@@ -79,23 +76,12 @@ class MagneticDipole(InMagneticField):
         """Largest 2 m B."""
         return 2 * norm(scene.context, self.moment) * self.most(scene)
 
-    def told(self, scene: Scene) -> str:
-        moment, largest = self._words(scene)
-        joined = ": " if self.uniform else "; "
-        return f"{moment} in {self._described_field(scene)}{joined}{largest}"
-
-    def _words(self, scene: Scene) -> tuple[str, str]:
-        """What the moment is, and what it does."""
-        moment = f"magnetic dipole of {value_text(norm(scene.context, self.moment), 'A m^2')}"
-        return moment, f"torque up to {value_text(self.amplitude(scene) / 2, 'N m')}"
-
 
 @dataclass(frozen=True, kw_only=True)
 class SteeredDipole(MagneticDipole):
     """A moment given by expressions, as by a law of magnetorquers."""
 
     law: tuple[Expression, ...] = ()  # its components, A m^2, body axes
-    described = "a magnetic dipole given by expressions"
     conservative = False
 
     def acts(self) -> bool:
@@ -123,12 +109,6 @@ class SteeredDipole(MagneticDipole):
 
     def amplitude(self, scene: Scene) -> Any | None:
         return None
-
-    def _words(self, scene: Scene) -> tuple[str, str]:
-        values, context = start_values(scene), scene.context
-        size = norm(context, [evaluate(component, values, context) for component in self.law])
-        shown = ", ".join(_text(component) for component in self.law)
-        return f"magnetic dipole of [{shown}] A m^2", f"{value_text(size, 'A m^2')} at the start"
 
 
 def _text(component: Expression) -> str:

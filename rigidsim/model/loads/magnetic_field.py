@@ -11,7 +11,7 @@ import heyoka as hy
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, SourcePlace, loads_of
-from rigidsim.model.load_words import length_text, orbit_text, sides_text, value_text
+from rigidsim.model.load_words import length_text, value_text
 from rigidsim.model.loads.central_gravity import CentralGravity
 from rigidsim.model.loads.earth_field import EarthField
 from rigidsim.model.loads.magnetic_keys import (
@@ -22,7 +22,7 @@ from rigidsim.model.loads.magnetic_keys import (
     refuse_contradictions,
 )
 from rigidsim.model.magnetic_names import FIELD_NAMES
-from rigidsim.model.plausibility import about_orbit, implied_strength
+from rigidsim.model.plausibility import about_orbit
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import rounded
 from rigidsim.scene.arithmetic import Vector, dot, norm
@@ -230,21 +230,6 @@ class InMagneticField(Load):
         along = 3.0 * hy.sum([e * x for e, x in zip(unit, c, strict=True)])
         space = [falling * (along * x - e) for e, x in zip(unit, c, strict=True)]
         return m.seen(space)
-
-    def _described_field(self, scene: Scene) -> str:
-        """What the field is, for readers."""
-        if self.uniform:
-            return f"a uniform field of {value_text(norm(scene.context, self.source), 'T')}"
-        if self.earth is not None:
-            size = value_text(norm(scene.context, self.flux_density_at_start(scene)), "T")
-            return f"{self.earth.described}: {size} at the start"
-        source = value_text(norm(scene.context, self.source), "A m^2")
-        if self.orbit is None:
-            where = f"{length_text(float(self._far(scene)))} away at the start"
-        else:
-            where = orbit_text(self.orbit, implied_strength(self.orbit))
-            where += f"; {sides_text(self.source_at_start(scene))}"
-        return f"the field of a dipole of {source}, {where}"
 
     def fastest_rate(self, scene: Scene) -> Any:
         """Angular rate at pericentre, rad/s; in flight that at the start."""

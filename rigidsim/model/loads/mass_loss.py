@@ -25,21 +25,16 @@ from pydantic import Field
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import value_text
 from rigidsim.model.names import written
 from rigidsim.scene.arithmetic import Matrix, Vector, norm
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.expressions.tree import (
     Constant,
     Expression,
-    evaluate,
     states_read,
 )
 from rigidsim.scene.fields import Formula, Metre, NotNegative, Triple
-from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.registry import LoadFields, Setting, register_load
-from rigidsim.scene.scene import Scene
-from rigidsim.scene.tracing.numbers import plain
 
 
 class MassLossFields(LoadFields):
@@ -72,7 +67,6 @@ class MassLoss(Load):
 
     Fields = MassLossFields
     title = "mass_loss"
-    described = "mass that leaves"
 
     @classmethod
     def resolve(cls, fields: MassLossFields, around: Setting) -> MassLoss:
@@ -122,9 +116,3 @@ class MassLoss(Load):
 
     def never_negative(self) -> list[Expression]:
         return [self.rate]
-
-    def told(self, scene: Scene) -> str:
-        rate = evaluate(self.rate, start_values(scene), scene.context)
-        away = value_text(plain(norm(scene.context, self.arm)), "m")
-        given = value_text(plain(rate), "kg/s")
-        return f"mass_loss: {given} at the start ({self.rate.text}), {away} from the centre of mass"

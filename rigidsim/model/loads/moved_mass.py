@@ -52,7 +52,6 @@ class MovedMass(Load):
     moments: tuple[Any | Expression, ...]
 
     title = "principal_moments"
-    described = "mass that moves in the body"
     changes = "principal_moments vary"
     conservative = True  # the work of what moves it is told by ``supplied_power``
 
@@ -201,14 +200,6 @@ class MovedMass(Load):
         return found
 
     # --- what readers are told ------------------------------------------------------------------------------
-
-    def told(self, scene: Scene) -> str:
-        texts = ", ".join(f'"{x.text}" about {"xyz"[axis]}' for axis, x in self.formulae)
-        return (
-            f"principal_moments: mass moves in the body, {texts}; at the start "
-            + ", ".join(scene.context.nstr(x, 6) for x in scene.body.principal_moments)
-            + " kg m^2"
-        )
 
 
 def _diagonal(elements: list[Any]) -> list[list[Any]]:

@@ -17,7 +17,6 @@ import heyoka as hy
 from rigidsim.model.gradient import GradientSource, gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
 from rigidsim.model.load import Load, SourcePlace, Term
-from rigidsim.model.load_words import reach_text, source_text, value_text
 from rigidsim.model.orbit_planes import OrbitPlane
 from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.model.placements.kernel_body import kernel_body
@@ -140,10 +139,6 @@ class MovingSource(PointAttraction):
     felt: ClassVar[str]  # by the masses under full coupling
 
     @property
-    def described(self) -> str:  # type: ignore[override]
-        return f"a {self.title} load"
-
-    @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
         return frozenset({"attitude", "flight"} if self.masses.host is None else {"attitude"})
 
@@ -230,14 +225,6 @@ class MovingSource(PointAttraction):
 
     def fastest_rate(self, scene: Scene) -> Any:
         return self.encounter(scene)[1]
-
-    def told(self, scene: Scene) -> str:
-        distance, largest = norm(scene.context, self.start(scene)[0]), self.amplitude(scene)
-        return (
-            f'{self.title.replace("_", " ")} of the moving point mass "{self.masses.names[self.number]}", '
-            f"{source_text(self.strength)}, {reach_text(self.strength, distance)} at the start; "
-            f"torque up to {value_text(largest, 'N m')}" + (self.felt if self.masses.full else "")
-        )
 
     def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
         given, distance = self._given(scene)

@@ -59,7 +59,6 @@ class RadiationPressure(SurfaceLoad):
     light: str
     Fields = RadiationPressureFields
     title = "radiation_pressure"
-    described = "radiation pressure"
 
     @staticmethod
     def effect_parts(fields: RadiationPressureFields) -> Iterator[EffectPart]:
@@ -84,9 +83,6 @@ class RadiationPressure(SurfaceLoad):
         if fields.shadow and f"shadow_{name}" in around.names:
             factors.append(pushes.parsed(f"shadow_{name}"))
         return cls(pushes.acting(), pushes.stream, tuple(factors), around.free_flight, name)
-
-    def _words(self) -> str:
-        return f"radiation pressure of {self.light}"
 
 
 def _push(pushes: Pushes, number: int, surface: OuterSurface, pressure: Any) -> None:

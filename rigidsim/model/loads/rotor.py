@@ -26,7 +26,6 @@ import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import axis_text, value_text
 from rigidsim.model.names import in_si, written
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import exponent
@@ -92,10 +91,6 @@ class Rotor(Load):
     @property
     def title(self) -> str:  # type: ignore[override]
         return f"rotor {self.name}"
-
-    @property
-    def described(self) -> str:  # type: ignore[override]
-        return "a rotor" if self.motor is None else "a driven rotor"
 
     @property
     def bearing(self) -> Bearing | None:  # type: ignore[override]
@@ -219,22 +214,6 @@ class Rotor(Load):
         return self.carried_at_start(scene)[0]
 
     # --- what readers and pictures are told -----------------------------------------------------------------
-
-    def told(self, scene: Scene) -> str:
-        rate, moment = value_text(plain(self.rate), "rad/s"), value_text(plain(self.moment), "kg m^2")
-        said = f"{self.title}: {moment} about {axis_text(self.axis)}, "
-        if not self.acts():
-            return said + "locked: part of the body"
-        if self.fixed:
-            said += f"kept at {rate} relative to the body by a motor"
-        elif self.motor is None:
-            said += f"free, {rate} relative to the body at the start"
-        else:
-            said += f"{rate} relative to the body at the start, driven by a motor of {self.motor.text} N m"
-        own = norm(scene.context, apply(scene.body.inertia, scene.angular_velocity))
-        momentum = value_text(plain(abs(self.starting_momentum(scene))), "kg m^2/s")
-        said += f"; its momentum about its axis is {momentum}"
-        return said + (f", the body's {value_text(plain(own), 'kg m^2/s')}" if own else "")
 
     def pictured(self) -> dict[str, Any]:
         return {

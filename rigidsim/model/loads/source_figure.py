@@ -22,7 +22,7 @@ from rigidsim.model.earth_pole import earth_pole
 from rigidsim.model.gradient import GradientSource, tensor_terms
 from rigidsim.model.kinematics import Kinematics, inertia_times
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import length_text, value_text
+from rigidsim.model.load_words import length_text
 from rigidsim.model.loads.gravity_field import AttractingFields, least_distance
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, across, cross, norm, parallel, unit_vectors
@@ -40,7 +40,6 @@ from rigidsim.scene.fields import (
 )
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
-from rigidsim.scene.readable import number_text
 from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.tracing.numbers import plain
@@ -108,7 +107,6 @@ class FigureAttraction(Load):
     axes: str | None = None
 
     title = "figure"
-    described = "the figure of a source"
     unaveraged = "the figure of a source has no average", "leave figure out"
 
     @property
@@ -223,17 +221,6 @@ class FigureAttraction(Load):
         difference = context.maximum(moments) - context.minimum(moments)
         near = least_distance(self.beside, scene)
         return 15 * self.strength * abs(self.size) / near**5 * difference
-
-    def told(self, scene: Scene) -> str:
-        pole = "of the Earth by IAU 1976 with the 18.6-year nutation"
-        if self.pole is not None:
-            pole = "(" + ", ".join(number_text(float(plain(x)), 4) for x in self.pole) + ") in space axes"
-        oblateness = number_text(float(plain(self.size / self.radius**2)), 6)
-        return (
-            f"figure of the source of [[loads]] number {self.number}: J2 {oblateness}, radius "
-            f"{length_text(float(plain(self.radius)))}, pole {pole}; torque up to "
-            f"{value_text(plain(self.amplitude(scene)), 'N m')}"
-        )
 
     @staticmethod
     def effect_parts(fields: FigureFields) -> Iterator[EffectPart]:

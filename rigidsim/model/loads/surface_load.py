@@ -8,7 +8,6 @@ or the stream, are surfaces on which steps end, and the states that they take ar
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,16 +16,13 @@ import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import value_text
 from rigidsim.model.names import written
 from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm
 from rigidsim.scene.bodies.outside import OuterSurface, Plate
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions.tree import Expression, evaluate, states_read
-from rigidsim.scene.initial_values import start_values
+from rigidsim.scene.expressions.tree import Expression, states_read
 from rigidsim.scene.registry import Setting
-from rigidsim.scene.scene import Scene
 
 Sum = Mapping[Expression, Any]
 """A sum of expressions times coefficients (mpf)."""
@@ -139,27 +135,6 @@ class SurfaceLoad(Load):
         size = context.ldexp(largest / m.carried(m.scene.body.mass), m.scaling.time - m.scaling.speed)
         pushed = apply(m.matrix, [hy.expression(0.0) if x is None else x for x in parts])
         return list(zip(diagonal([size] * 3), pushed, strict=True))
-
-    def _at_start(self, scene: Scene) -> tuple[Vector, Vector]:
-        """Force and torque in body axes, N and N m (mpf)."""
-        context, values = scene.context, start_values(scene)
-        found = {x: evaluate(x, values, context) for x in self.expressions}
-        factor = math.prod(found[x] for x in self.factors)
-        sums = (self._vector(self._parts(torque=torque), found, lambda x: x, sum) for torque in (False, True))
-        force, torque = ([context.zero if x is None else factor * x for x in parts] for parts in sums)
-        return force, torque
-
-    def told(self, scene: Scene) -> str:
-        count = len(scene.config.body.surfaces or [])
-        said = f"{self._words()} on {count} surface{'s' if count != 1 else ''}: "
-        if not self.acts():
-            return f"{said}no torque whatever the attitude"
-        force, torque = (norm(scene.context, x) for x in self._at_start(scene))
-        pushed = f"{value_text(force, 'N')} and " if self.flies else ""
-        return f"{said}{pushed}{value_text(torque, 'N m')} at the start"
-
-    def _words(self) -> str:
-        return self.title
 
 
 def _joined(vectors: Iterable[tuple[Push, Vector]]) -> list[Sum]:

@@ -12,10 +12,9 @@ from pydantic import Field
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import direction_text, value_text
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import potential_amplitude
-from rigidsim.scene.arithmetic import Vector, across, cross, norm, unit_vectors
+from rigidsim.scene.arithmetic import Vector, across, cross, unit_vectors
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.fields import Acceleration, Triple
@@ -114,15 +113,6 @@ class UniformGravity(Load):
     def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
         """M com (body axes) and g (space axes) about a fixed point; None in free fall."""
         return None if scene.torque_arm is None else (scene.torque_arm, self.acceleration)
-
-    def told(self, scene: Scene) -> str:
-        if all(g == 0 for g in self.acceleration):
-            return "uniform gravity of zero"
-        size = value_text(norm(scene.context, self.acceleration), "m/s^2", 6)
-        field = f"uniform gravity, {size} {direction_text(self.acceleration)}"
-        if scene.torque_arm is not None:
-            return f"{field}: torque about the fixed point up to {value_text(self.amplitude(scene), 'N m')}"
-        return f"{field}: free fall" if scene.free_flight else f"{field}: no effect about the centre of mass"
 
     def cautions(self, fields: UniformGravityFields, where: str, scene: Scene) -> Iterator[Caution]:
         pull = [float(x) for x in fields.acceleration]

@@ -9,10 +9,8 @@ from pydantic import Field
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import span_words
 from rigidsim.scene.arithmetic import Vector, cross, negligible, norm
 from rigidsim.scene.fields import Damping, NotNegative, Triple
-from rigidsim.scene.readable import number_text
 from rigidsim.scene.registry import LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene
 
@@ -35,7 +33,6 @@ class ViscousTorque(Load):
     coefficients: Vector
     Fields = ViscousTorqueFields
     title = "viscous_torque"
-    described = "a viscous torque"
 
     @classmethod
     def resolve(cls, fields: ViscousTorqueFields, around: Setting) -> ViscousTorque:
@@ -64,14 +61,3 @@ class ViscousTorque(Load):
                 vector = [-scaled * m.numbers.rate_units[i] if i == j else context.zero for j in range(3)]
                 terms.append((vector, m.rate_states[i]))
         return terms
-
-    def told(self, scene: Scene) -> str:
-        """See ``Load``; the times are those of the rates about the body axes, moment over coefficient."""
-        sizes = ", ".join(number_text(float(c), 4) for c in self.coefficients)
-        inertia = scene.body.inertia
-        spans = [
-            f"{axis} {span_words(inertia[i][i] / c)}"
-            for i, (axis, c) in enumerate(zip("xyz", self.coefficients, strict=True))
-            if c != 0
-        ]
-        return f"viscous torque, {sizes} kg m^2/s: damps the rates by 1/e in about {', '.join(spans)}"

@@ -12,7 +12,6 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.load_words import reach_text
 from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion
 from rigidsim.model.plausibility import about_named_strength
 from rigidsim.model.rotations import Symbolic
@@ -164,10 +163,6 @@ class PlacedByKernel(Placement):
 
     def pictured(self) -> dict[str, Any]:
         return {"kernel": self.name}
-
-    def told(self, context: Any, strength: Any) -> str:
-        least, most, _ = self._reach
-        return f"where {self.ephemeris.kernel.name} has it, {reach_text(strength, least, most)}"
 
 
 def _rate(times: np.ndarray, otherwise: float) -> float:

@@ -108,10 +108,6 @@ class Placement(ABC):
         """Place at the start, m (mpf)."""
 
     @abstractmethod
-    def told(self, context: Any, strength: Any) -> str:
-        """Where it is in a reader's terms, for a source of a gravitational parameter."""
-
-    @abstractmethod
     def circuit(self, context: Any) -> Circuit:
         """How it goes round."""
 

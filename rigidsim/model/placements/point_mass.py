@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.load_words import reach_text
 from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.arithmetic import Vector, norm
+from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.scene import Scene
 
 _ALMOST_PARABOLIC = 0.99  # a larger eccentricity's harmonics, of which a few thousand are told, hardly differ
@@ -72,6 +71,3 @@ class PlacedAsMass(Placement):
         e = min(e + 2 * perturbed, _ALMOST_PARABOLIC)
         doubt = perturbed * motion
         return Circuit(motion, e, closer**-3, doubt, doubt, float(rate))
-
-    def told(self, context: Any, strength: Any) -> str:
-        return f"{reach_text(strength, norm(context, self.pair.place))} at the start"

@@ -11,7 +11,6 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.load_words import orbit_text, reach_text
 from rigidsim.model.orbits.kepler_motion import KeplerParts
 from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion
 from rigidsim.model.plausibility import about_distance, about_orbit, about_spin, about_strength, attracting
@@ -60,9 +59,6 @@ class PlacedAtRest(Placement):
     def keeps_plane(self, context: Any, normal: Vector) -> bool:
         direction = self._direction(context)
         return across(context, direction, normal) or parallel(context, direction, normal)
-
-    def told(self, context: Any, strength: Any) -> str:
-        return f"at rest, {reach_text(strength, norm(context, self.position))}"
 
     def pictured(self) -> dict[str, Any]:
         return {"position": [float(x) for x in self.position]}
@@ -114,9 +110,6 @@ class PlacedOnOrbit(Placement):
     def keeps_plane(self, context: Any, normal: Vector) -> bool:
         return self.orbit.node_rate == 0 and parallel(context, self.orbit.normal(context), normal)
 
-    def told(self, context: Any, strength: Any) -> str:
-        return orbit_text(self.orbit, strength)
-
     def pictured(self) -> dict[str, Any]:
         names = [field.name for field in dataclasses.fields(self.orbit)]
         return {"orbit": {name: float(getattr(self.orbit, name)) for name in names}}
@@ -154,7 +147,3 @@ class PlacedByTable(Placement):
 
     def fastest_rate(self, context: Any) -> Any:
         return self.table.fastest_rate()
-
-    def told(self, context: Any, strength: Any) -> str:
-        reach = reach_text(strength, self.distance(context))
-        return f"{reach} on average, on an orbit {self.table.described}"

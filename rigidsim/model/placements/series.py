@@ -17,7 +17,6 @@ from typing import Any, ClassVar
 import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics, seconds
-from rigidsim.model.load_words import reach_text
 from rigidsim.model.orbit_planes import EclipticPlane, OrbitPlane
 from rigidsim.model.placements.placement import Circuit, Placement
 from rigidsim.model.rotations import Symbolic
@@ -105,9 +104,6 @@ class PlacedBySeries(Placement):
     def circuit(self, context: Any) -> Circuit:
         days, e = _MEAN[self.body]
         return Circuit(2 * math.pi / (days * _DAY), e, (1 - e) ** -3)
-
-    def told(self, context: Any, strength: Any) -> str:
-        return f"from its series, about {reach_text(strength, self.distance(context))}"
 
     def pictured(self) -> dict[str, Any]:
         return {"ephemeris": self.body}

@@ -39,8 +39,6 @@ class FieldFile:
     strength: Fraction
     normalized: bool
     degree: int
-    tide: str = ""
-    name: str = ""
     rows: dict[tuple[int, int], tuple[Fraction, Fraction]] = field(default_factory=dict)
 
     def squared_factor(self, n: int, m: int) -> Fraction:
@@ -122,8 +120,6 @@ def _icgem(lines: list[tuple[int, str]]) -> tuple[FieldFile, Iterator[Row]]:
         _positive(head[strength or ""], strength or ""),
         _NORMALIZED[norm],
         int(head["max_degree"]),
-        head.get("tide_system", ""),
-        head.get("modelname", ""),
     )
     rows = ((number, line.split()) for number, line in lines[end + 1 :])
     return found, ((number, words[0], words[1:]) for number, words in rows if words)

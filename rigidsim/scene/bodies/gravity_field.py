@@ -107,13 +107,11 @@ class GravityField:
         radius: R, m (mpf).
         coefficients: C and S (mpf), unnormalized, by harmonic.
         degree: the highest that is known.
-        described: where it comes from; empty for the config itself.
     """
 
     radius: Any
     coefficients: dict[Harmonic, Any]
     degree: int
-    described: str = ""
 
     def to(self, degree: int) -> dict[Harmonic, Any]:
         """Coefficients from degree 3 to a degree, without zeros."""
@@ -191,9 +189,7 @@ def _of_file(name: str, body: Any, context: Any, texts: Mapping[str, str], degre
     _refuse_other_tensor(given, found, radius, body, context)
     _refuse_impossible(found, context, given, " file")
     beyond = {key: c for key, c in found.items() if key[0] >= LEAST}
-    tide = f"({read.tide})" if read.tide else ""
-    described = " ".join(f'"{name}" {read.name} {tide}'.split())
-    return GravityField(radius, beyond, degree, described)
+    return GravityField(radius, beyond, degree)
 
 
 def _refuse_impossible(found: Mapping[Harmonic, Any], context: Any, given: str = "", key: str = "") -> None:

@@ -213,7 +213,7 @@ def closed_form_of(scene: Scene, *, driven: bool = False) -> ClosedForm:
     if driven:
         raise NoClosedForm("a load given from Python has no closed form")
     for load in scene.loads:
-        raise NoClosedForm(f"{load.described} has no closed form here")
+        raise NoClosedForm(f"{load.title} has no closed form here")
     for state in scene.states:
         raise NoClosedForm(f"the state {state.name} of [[states]] has no closed form")
     context = mpmath.MPContext()

@@ -77,15 +77,15 @@ def _all(config: Config) -> Iterator[PhysicalEffect]:
         yield PhysicalEffect(code, fields.kind.replace("_", " "), gone=("loads", n))  # type: ignore[attr-defined]
     for key, load in LOADS["body"].items():
         if not load.brought_by(config) or _is_nothing(config, key, load.nothing):
-            yield PhysicalEffect(key, load.described, missing=f"the config gives none ([body] {key})")
+            yield PhysicalEffect(key, load.title, missing=f"the config gives none ([body] {key})")
             continue
         yield from _parts(key, f"body.{key}", load.effect_parts(config))
         if load.nothing:
             preset = config.body.preset is not None
             given = {f"{key}.{x}": value for x, value in load.nothing.items()} if preset else {key: None}
-            yield PhysicalEffect(key, load.described, {f"body.{x}": value for x, value in given.items()})
+            yield PhysicalEffect(key, load.title, {f"body.{x}": value for x, value in given.items()})
         else:
-            yield PhysicalEffect(key, load.described, missing="no single key leaves it out")
+            yield PhysicalEffect(key, load.title, missing="no single key leaves it out")
     for array in ("bodies", *LOADS["table"]):
         for n, table in enumerate(getattr(config, array)):
             words = f"{_TITLES.get(array, '')}{table.name}"
