@@ -1,15 +1,17 @@
 """How a config was understood, as values to show, and what in it is suspicious."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from typing import Any
 
 from rigidsim.model.formulations.formulation import ModelPlan
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.load_estimate import effect_at_start
+from rigidsim.model.load_words import length_text
 from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.plausibility import about_named_strength, about_radius
+from rigidsim.model.sources import sources_of
 from rigidsim.scene import attitude
-from rigidsim.scene.arithmetic import Vector, working_bits
+from rigidsim.scene.arithmetic import Vector, norm, working_bits
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import ConfigTable
@@ -23,6 +25,7 @@ from rigidsim.scene.suspicions import (
     suspicious_expressions,
     unreachable_events,
 )
+from rigidsim.scene.tracing.numbers import plain
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.store.summary import Span, Start, UnderstoodBody
 from rigidsim.store.summary_parts import Three
@@ -90,29 +93,36 @@ def told_loads(prepared: InitialValueProblem, *, sizes: bool = True) -> tuple[st
         rows += [
             (key, getattr(scene.config.body, key), load) for load in scene.loads if isinstance(load, kind)
         ]
+    placed = {source.number for source in sources_of(scene.config)}
+    rows += [(load.title, load.__doc__ or "given from Python", load) for load in prepared.python_loads]
     said = []
-    for what, fields, load in rows:
-        uniform = load.uniform_field is not None  # all of which are one load
-        of = [
-            x
-            for x in plan.loads
-            if (isinstance(x, UniformGravity) if uniform else load is x or load is x.beside)
-        ]
-        name = getattr(fields, "name", None)
-        text = f"{what} {name}: {_value(fields)}" if name else f"{what}: {_value(fields)}"
-        text += f"; {load.remark}" if load.remark else ""
-        said.append(text + (_effect(plan, of) if sizes and of and not any(x.wide for x in of) else ""))
-    for load in prepared.python_loads:
-        doc = (type(load).__doc__ or "given from Python").partition("\n")[0]
-        said.append(f"{load.title}: {doc}" + (_effect(plan, [load]) if sizes else ""))
+    for number, (what, given, load) in enumerate(rows):
+        name = getattr(given, "name", None)
+        said.append(f"{what} {name}: {_value(given)}" if name else f"{what}: {_value(given)}")
+        said[-1] += f"; {load.remark}" if load.remark else ""
+        place = load.source_at_start(scene) if sizes and number in placed else []
+        if effects := [*_seen(place, scene), *(_effects(plan, load) if sizes else [])]:
+            said[-1] += f"; at the start {', '.join(effects)}"
     return (*said, *(state.told for state in scene.states))
 
 
-def _effect(plan: ModelPlan, loads: Sequence[Load]) -> str:
-    """Torque and force at the start; empty for loads without any."""
-    found = effect_at_start(plan, loads)
-    said = [f"{what} {number_text(size, _DIGITS)} {unit}" for what, size, unit in found]
-    return f"; at the start {', '.join(said)}" if said else ""
+def _seen(place: Vector, scene: Scene) -> Iterator[str]:
+    """Where a source is, if it is at a known place."""
+    if place:
+        away = norm(scene.context, place)
+        towards = ", ".join(number_text(float(plain(x / away))) for x in place)
+        yield f"source {length_text(float(plain(away)))} away towards [{towards}] in space axes"
+
+
+def _effects(plan: ModelPlan, load: Load) -> list[str]:
+    """Sizes of a load's torque and force, with what acts beside it; none of long series."""
+    together = [x for x in plan.loads if load is x or load is x.beside]
+    if load.uniform_field is not None:  # all of which are one load
+        together = [x for x in plan.loads if isinstance(x, UniformGravity)]
+    if not together or any(x.wide for x in together):
+        return []
+    found = effect_at_start(plan, together)
+    return [f"{what} {number_text(size, _DIGITS)} {unit}" for what, size, unit in found]
 
 
 def _value(value: Any) -> str:
@@ -127,7 +137,7 @@ def _value(value: Any) -> str:
     if isinstance(value, dict):
         return f"of {len(value)} terms"
     if not isinstance(value, list):
-        return " ".join(str(value).split())
+        return " ".join(str(value).split("\n\n")[0].split())
     parts = [_value(x) for x in value]
     units = {x.partition(" ")[2] for x in parts}
     if len(units) != 1 or not all(isinstance(x, ExactNumber) for x in value):

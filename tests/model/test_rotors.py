@@ -245,7 +245,7 @@ def test_a_slender_satellite_with_a_damper_ends_in_a_flat_spin_as_explorer_1_did
         (["rotors[0].moment=1.05"], "principal moments .* which no body has"),
         (["rotors[0].axis=[0, 0, 0]"], "a direction is needed"),
         (["rotors[0].fixed=true", 'rotors[0].torque="1"'], "given with fixed = true"),
-        (['rotors[0].torque="0.1*qx"'], r"\[\[rotors\]\] number 1 torque: a driven rotor depends"),
+        (['rotors[0].torque="0.1*qx"'], r"\[\[rotors\]\] number 1 torque: rotor w0 depends"),
         (['integrator.formulation="canonical"'], "rotor w0 carries angular momentum"),
         (['integrator.method="closed_form"'], "has no closed form"),
     ],

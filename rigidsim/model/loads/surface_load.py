@@ -8,7 +8,7 @@ or the stream, are surfaces on which steps end, and the states that they take ar
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -83,42 +83,30 @@ class SurfaceLoad(Load):
         ]
         return _joined(streaming)[: 3 if torque else 1], _joined(others)
 
-    def _vector(
-        self,
-        parts: tuple[list[Sum], list[Sum]],
-        values: Mapping[Expression, Any],
-        number: Callable[[Any], Any],
-        add: Callable[[list[Any]], Any],
-    ) -> list[Any | None]:
-        """The force or torque but for the factors, body axes; None where nothing acts."""
-
-        def total(part: Sum) -> Any | None:
-            terms = [number(x) * values[expression] for expression, x in part.items()]
-            return add(terms) if terms else None
-
-        along, axes = ([total(part) for part in group] for group in parts)
-        stream, found = [values[x] for x in self.stream], []
-        for i in range(3):
-            j, k = (i + 1) % 3, (i + 2) % 3
-            pairs = [(along[0], stream[i])]
-            if len(along) == 3:
-                pairs = [(along[j], stream[k]), (along[k], -stream[j])]
-            terms = [x for x in (axes[i], *(a * b for a, b in pairs if a is not None)) if x is not None]
-            found.append(add(terms) if terms else None)
-        return found
-
     def _in_body(self, m: Kinematics, *, torque: bool) -> tuple[Any, list[Symbolic | None]]:
         """The largest coefficient (mpf), and the force or torque in units of it: so that sums are within the
-        range of single precision.
+        range of single precision; None where nothing acts.
         """
         parts, context = self._parts(torque=torque), m.scene.context
         largest = context.maximum(
             [context.zero, *(abs(x) for group in parts for y in group for x in y.values())]
         )
         values = dict(zip(self.expressions, written(m, self.expressions), strict=True))
-        found = self._vector(parts, values, lambda x: m.number(x / largest), hy.sum)
-        factors = [values[x] for x in self.factors]
-        return largest, [None if x is None else hy.prod([*factors, x]) for x in found]
+
+        def total(part: Sum) -> Symbolic | None:
+            terms = [m.number(x / largest) * values[expression] for expression, x in part.items()]
+            return hy.sum(terms) if terms else None
+
+        along, axes = ([total(part) for part in group] for group in parts)
+        stream, factors, found = [values[x] for x in self.stream], [values[x] for x in self.factors], []
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            pairs = [(along[0], stream[i])]
+            if len(along) == 3:
+                pairs = [(along[j], stream[k]), (along[k], -stream[j])]
+            terms = [x for x in (axes[i], *(a * b for a, b in pairs if a is not None)) if x is not None]
+            found.append(hy.prod([*factors, hy.sum(terms)]) if terms else None)
+        return largest, found
 
     def torque(self, m: Kinematics) -> list[Term]:
         """Torque place x force."""
