@@ -8,11 +8,14 @@ Two folders load what draws, and are imported only where a picture is drawn: `ti
 | `timeline` | `write_timeline`, `write_comparison`: datasets to a recording of rerun; a package of its own |
 | `figures` | figures by name, dataset to matplotlib, PNG or SVG; a package of its own |
 | `figure_names` | their names, without any import |
+| `record`, `signals` | the recorded scene of a dataset; its quantities |
+| `curves`, `paths`, `plots` | what is drawn over time, and in planes, in one form for both |
+| `pages`, `page` | what a scene shows first, and its numbers in words; the summary page |
+| `units` | units for readers |
 | `stages` | stages by kind of scene, as numbers; a package of its own |
-| `plots`, `page`, `states` | variables to plots; the summary page; lanes of events, and sections |
-| `thinning`, `signals` | a bounded number of rows of a dataset; what they tell and show |
-| `fits`, `librations` | secular parts, periods and ellipses; a body that turns one face to its source |
-| `surroundings` | what stands around the body, from the dataset's attributes |
-| `solids`, `symbols` | meshes of bodies; toy tops, globes with their continents, edges |
+| `sources`, `gyrostats` | what pulls at a body, and librations; bodies with rotors |
+| `fits` | secular parts, periods and ellipses, by ``analysis`` |
+| `thinning`, `states` | a bounded number of a dataset's rows; lanes of events |
+| `solids`, `symbols` | meshes of bodies; toy tops, globes and maps, edges |
 | `viewer`, `film` | the viewer, also of a run that goes on; pictures and films of a timeline |
 """

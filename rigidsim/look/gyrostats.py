@@ -16,7 +16,8 @@ from typing import Self
 import numpy as np
 import xarray
 
-from rigidsim.look import signals, surroundings
+from rigidsim.look import signals
+from rigidsim.look.record import scene_of
 from rigidsim.look.solids import Array
 
 _STEADY = 1e-5  # of its size, within which the momentum's is constant: more than rounding in single precision
@@ -55,7 +56,7 @@ def rotors(dataset: xarray.Dataset) -> list[RecordedRotor]:
     recorded = signals.values(dataset, "rotor_rate")
     named = {} if recorded is None else dict(zip(dataset["rotor"].values.tolist(), recorded.T, strict=True))
     found = []
-    for one in surroundings.told(dataset, "rotor"):
+    for one in scene_of(dataset).rotors:
         rate = named.get(one["name"])
         if rate is None and one["drive"] == "fixed":
             rate = np.full(dataset.sizes["time"], float(one["rate"]))
@@ -68,19 +69,13 @@ def rotors(dataset: xarray.Dataset) -> list[RecordedRotor]:
 
 def tensor(dataset: xarray.Dataset) -> Array | None:
     """The body's tensor (3, 3), rotors locked, body axes, kg m^2; None if it changes, or isn't known."""
-    if "principal_moments" in dataset:
-        return None
-    found, moments = signals.attribute(dataset, "inertia_tensor"), signals.moments(dataset)
-    if found is not None and found.shape == (3, 3):
-        return found
-    axes = signals.principal_axes(dataset)
-    return None if moments is None else np.asarray(axes.T * moments @ axes)
+    return None if "principal_moments" in dataset else scene_of(dataset).inertia
 
 
 def momentum(dataset: xarray.Dataset) -> Array | None:
     """Angular momentum (rows, 3) of the body and all its rotors, body axes, kg m^2/s."""
     inertia, rates, found = tensor(dataset), signals.values(dataset, "angular_velocity"), rotors(dataset)
-    unknown = len(found) < len(surroundings.told(dataset, "rotor")) or surroundings.told(dataset, "core")
+    unknown = len(found) < len(scene_of(dataset).rotors) or scene_of(dataset).core
     if inertia is None or rates is None or unknown:
         return None
     return np.asarray(signals.turned(rates, inertia) + sum(rotor.inner for rotor in found))

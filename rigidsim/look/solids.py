@@ -4,7 +4,6 @@ Every mesh is a list of separate triangles (no shared vertices), so that neighbo
 sharp colours; normals point outwards and are smooth where the solid is.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -30,6 +29,7 @@ _DARKER = 0.62
 _LIGHT = (232, 224, 206)
 _UPPER = (70, 118, 190)
 _LOWER = (200, 96, 62)
+_CUBE = {"solid": "cuboid", "dimensions": {"size": [1.0, 1.0, 1.0]}}
 _BARE = (92, 94, 100)  # the back of a plate that light and air meet from its front alone
 
 
@@ -66,33 +66,10 @@ def solid_mesh(solid: str, dimensions: Mapping[str, Any]) -> Mesh:
     """Mesh of a solid of ``SHAPES`` about its own centre of mass, in its own axes; dimensions in metres.
 
     A dimension of zero is drawn as a fiftieth of the largest one.
-
-    Raises:
-        ValueError: an unknown solid, a dimension that is missing, negative, too large or not finite, or a
-            solid without any extent.
     """
-    if solid not in shapes.SHAPES:
-        known = ", ".join(sorted([*shapes.SHAPES, POINT]))
-        raise ValueError(f"drawing: unknown solid {solid!r}; known are {known}")
     shape = shapes.SHAPES[solid]
-    given: dict[str, Array] = {}
-    for key, length in shape.dimensions.items():
-        if key not in dimensions:
-            raise ValueError(f"drawing: {solid} needs dimension {key!r}, given {list(dimensions)}")
-        value = np.asarray(dimensions[key], dtype=float)
-        if value.size != length or not (np.isfinite(value).all() and (value >= 0).all()):
-            raise ValueError(
-                f"drawing: {solid} {key} must be {length} finite number(s) >= 0, given {dimensions[key]!r}"
-            )
-        given[key] = value.reshape(length)
+    given = {key: np.asarray(dimensions[key], dtype=float).reshape(-1) for key in shape.dimensions}
     largest = max(value.max() for value in given.values())
-    if largest == 0:
-        raise ValueError(f"drawing: {solid} has no extent, given {dict(dimensions)}")
-    if shape.at_most is not None:
-        small, large = shape.at_most
-        if given[small] > given[large]:
-            sizes = f"{small} {given[small][0]:g} exceeds {large} {given[large][0]:g}"
-            raise ValueError(f"drawing: {solid} {sizes}")
     # Ideal rods and plates have no thickness; a picture of them needs some.
     outline = shape.outline(
         {key: np.maximum(value, shapes.THINNESS * largest).tolist() for key, value in given.items()}
@@ -106,16 +83,15 @@ def solid_mesh(solid: str, dimensions: Mapping[str, Any]) -> Mesh:
             return revolved(pieces)
 
 
-def body_meshes(drawing: str | None) -> list[Mesh]:
-    """Meshes (metres) of a body from the dataset's `drawing` attribute, placed in body axes, one per solid.
+def body_meshes(drawing: Sequence[Mapping[str, Any]]) -> list[Mesh]:
+    """Meshes (metres) of a body from the ``drawing`` of its recorded scene, in body axes, one per solid.
 
-    It is a JSON list of {"solid", "dimensions", "position", "quaternion"}: position of the solid's centre of
-    mass in body axes from the reference point, metres; quaternion [w, x, y, z] turns the solid's axes to body
-    axes. None or an empty list: a unit cube. The volume of a `point` goes with its `mass_fraction`; the
-    largest radius is a sixth of the reach. ``ValueError`` for JSON that is not such a list, or see
-    `solid_mesh`.
+    Each is {"solid", "dimensions", "position", "quaternion"}: position of the solid's centre of mass in body
+    axes from the reference point, metres; quaternion [w, x, y, z] turns the solid's axes to body axes. Of an
+    empty list a unit cube. The volume of a `point` goes with its `mass_fraction`; the largest radius is a
+    sixth of the reach.
     """
-    solids = [(entry, *_placement(entry)) for entry in _parse(drawing)]
+    solids = [(entry, *_placement(entry)) for entry in drawing or [_CUBE]]
     meshes = [None if one["solid"] == POINT else _solid(one).moved(*place) for one, *place in solids]
     reach = max(
         float(np.linalg.norm(shift)) if mesh is None else mesh.reach()
@@ -123,7 +99,7 @@ def body_meshes(drawing: str | None) -> list[Mesh]:
     )
     reach = reach or 1.0  # a single point at the reference point has no size of its own
 
-    def point(entry: dict[str, Any], turn: Array, shift: Array) -> Mesh:
+    def point(entry: Mapping[str, Any], turn: Array, shift: Array) -> Mesh:
         fraction = float(entry.get("dimensions", {}).get("mass_fraction", 1.0))
         radius = reach * max(np.cbrt(np.clip(fraction, 0.0, 1.0)) / 6, 0.03)
         return ball(radius, radius, radius, segments=32, rings=16).moved(turn, shift)
@@ -145,9 +121,9 @@ def _two_sided(plate: Mesh, back: Color) -> Mesh:
     return replace(plate, colors=colors)
 
 
-def point_positions(drawing: str | None) -> Array:
-    """Positions (P, 3) of the point masses of a `drawing`, body axes, metres; P may be 0."""
-    points = [_placement(e)[1] for e in _parse(drawing) if e["solid"] == POINT]
+def point_positions(drawing: Sequence[Mapping[str, Any]]) -> Array:
+    """Positions (P, 3) of the point masses of a ``drawing``, body axes, metres; P may be 0."""
+    points = [_placement(e)[1] for e in drawing if e["solid"] == POINT]
     return np.array(points, dtype=float).reshape(-1, 3)
 
 
@@ -156,20 +132,6 @@ def rotation_matrix(quaternion: Sequence[float] | Array) -> Array:
     q = np.asarray(quaternion, dtype=float)
     unit = np.moveaxis(q / np.sqrt(np.einsum("...i,...i->...", q, q))[..., None], -1, 0)
     return np.moveaxis(np.array(rotations.rotation_matrix(list(unit))), (0, 1), (-2, -1))
-
-
-def _parse(drawing: str | None) -> list[dict[str, Any]]:
-    if not drawing:
-        return [{"solid": "cuboid", "dimensions": {"size": [1.0, 1.0, 1.0]}}]
-    try:
-        solids = json.loads(drawing)
-    except json.JSONDecodeError as error:
-        raise ValueError(f"drawing: not JSON ({error})") from None
-    if not isinstance(solids, list) or not all(
-        isinstance(entry, dict) and "solid" in entry for entry in solids
-    ):
-        raise ValueError('drawing: must be a JSON list of objects with a "solid"')
-    return solids or _parse(None)
 
 
 def _placement(entry: Mapping[str, Any]) -> tuple[Array, Array]:

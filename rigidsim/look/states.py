@@ -7,13 +7,11 @@ import xarray
 
 from rigidsim.look import signals
 from rigidsim.look.solids import Array, rotation_matrix
-from rigidsim.look.stages.parts import PALE, PULL, Color, Plane
+from rigidsim.look.stages.parts import PALE, PULL, Color
 
 MOST_EVENTS = 2000  # largest number of events of one kind in a lane; of more, the first are shown
 CHART_LEFT = 0.5  # singular factor below which the solver leaves a chart of Euler angles
 _SHADES: tuple[Color, Color] = ((92, 148, 235), (240, 190, 60))
-_SECTION_POINTS = 8  # least number of points for a section to be drawn
-_PREFERRED = ("libration", "polar_motion", "tip", "nadir", "angular_velocity", "euler_angles")
 
 
 @dataclass(frozen=True)
@@ -81,36 +79,3 @@ def events_of(dataset: xarray.Dataset) -> list[str]:
         if event and name == f"{event}_time" and variable.dims == (event,) and variable.shape[0]:
             names.append(event)
     return names
-
-
-def sections_of(dataset: xarray.Dataset) -> list[Plane]:
-    """For each frequent event, two components recorded there, as points."""
-    planes = []
-    for event in events_of(dataset):
-        for name in _PREFERRED:
-            full = f"{event}_{name}"
-            if full not in dataset or dataset[full].ndim != 2:
-                continue
-            values = np.asarray(dataset[full].values, dtype=np.float64)
-            values = values[np.isfinite(values).all(axis=1)]
-            if len(values) < _SECTION_POINTS:
-                continue
-            spread = np.ptp(values, axis=0)
-            first, second = sorted(np.argsort(spread)[-2:])
-            labels = [str(k) for k in range(values.shape[1])]
-            across = str(dataset[full].dims[1])
-            if across in dataset:
-                labels = [str(label) for label in dataset[across].values]
-            unit = str(dataset[full].attrs.get("units", ""))
-            title = f"Section at {event}: {name.replace('_', ' ')}" + (f" [{unit}]" if unit != "1" else "")
-            points = values[:, [first, second]]
-            # The origin is their middle, which the names tell: a small section would be a dot far off
-            middle = (points.min(axis=0) + points.max(axis=0)) / 2
-            across, up = (
-                f"{labels[k]} (axes cross at {place:.4g})" if place else labels[k]
-                for k, place in zip((first, second), middle, strict=True)
-            )
-            key, shown = f"section_{event}", points - middle
-            planes.append(Plane(key, title, _SHADES[1], shown, moves=False, names=(across, up)))
-            break
-    return planes

@@ -211,7 +211,7 @@ class SceneLoad:
         return self
 
     def pictured(self) -> dict[str, Any] | None:
-        """The load's depiction as plain JSON values (see ``rigidsim.look.surroundings``); None if it isn't
+        """The load's depiction as plain JSON values (see ``rigidsim.look.record``); None if it isn't
         drawn.
         """
         return None

@@ -277,10 +277,9 @@ def root_attributes(
         principal_axes=json.dumps([[float(x) for x in a] for a in scene.body.principal_axes]),
         inertia_tensor=json.dumps([[float(x) for x in row] for row in scene.body.inertia]),
         body_source=scene.body.source,
-        drawing=json.dumps(scene.body.drawing),
         center_of_mass=json.dumps([float(x) for x in scene.body.center_of_mass]),
         mass=None if scene.body.mass is None else float(scene.body.mass),
-        surroundings=json.dumps(_surroundings(prepared)),
+        scene=json.dumps(_recorded(prepared)),
         axes=scene.axes,
         epoch=None if scene.epoch is None else str(scene.epoch),
         **kernel_attributes(scene),
@@ -316,16 +315,31 @@ def _of_ephemeris(scene: Scene) -> dict[str, Any]:
     return {"ephemeris_kernel": kernel.name, "ephemeris_span": span, "ephemeris_sha256": kernel.digest}
 
 
-def _surroundings(prepared: InitialValueProblem) -> list[dict[str, Any]]:
-    """The frame, gravity and the pictured objects of every load."""
+def _recorded(prepared: InitialValueProblem) -> dict[str, Any]:
+    """The scene as pictures read it (``rigidsim.look.record``)."""
     scene = prepared.scene
+    body, asked = scene.body, "reference" in scene.config.frame.model_fields_set
     locked = [x for found in scene.tabled.values() for x in found if not x.acts()]  # and drawn all the same
     shown = [load.pictured() for load in (*scene.loads, *locked, *prepared.python_loads)]
-    axes = scene.figure.pole, scene.reference, scene.gravity
-    pole, normal, pull = ([float(x) for x in axis] if axis else None for axis in axes)
-    shown.append({"what": "frame", "figure_axis": pole, "reference_normal": normal})
-    shown.append({"what": "gravity", "acceleration": pull} if pull else None)
-    return [one for one in shown if one is not None]
+
+    def plain(vector: Any) -> list[float] | None:
+        return [float(x) for x in vector] if vector else None
+
+    return {
+        "version": 1,
+        "moments": plain(body.principal_moments),
+        "axes": [plain(axis) for axis in body.principal_axes],
+        "inertia": [plain(row) for row in body.inertia],
+        "center_of_mass": plain(body.center_of_mass),
+        "mass": None if body.mass is None else float(body.mass),
+        "drawing": body.drawing,
+        "host": scene.config.body.host,
+        "figure_axis": plain(scene.figure.pole),
+        "reference": (plain(scene.reference) or "moving") if asked else None,
+        "space_axes": scene.axes,
+        "gravity": plain(scene.gravity),
+        "objects": [one for one in shown if one is not None],
+    }
 
 
 def of_complete(attributes: RootAttributes, summary: Summary, angles_wrapped_from: float) -> RootAttributes:

@@ -91,7 +91,7 @@ class RootAttributes(BaseModel):
         modelling_error, attitude_error: largest error of an averaged model's directions until the end, and
             estimate for the end of the run, rad.
         principal_moments, inertia_tensor: kg m^2; center_of_mass: from the reference point, body axes, m.
-        surroundings: objects around the body, for pictures (see ``rigidsim.look.surroundings``).
+        scene: what pictures are drawn from (see ``rigidsim.look.record``).
         ephemeris_kernel, ephemeris_span, ephemeris_sha256: name of the kernel that places bodies, dates
             between which it has them, and SHA-256 of its file, or of those read of a package in order.
         orientation_kernel, orientation_of, orientation_sha256: name of the kernel of a published orientation,
@@ -138,10 +138,9 @@ class RootAttributes(BaseModel):
     principal_axes: str
     inertia_tensor: str
     body_source: str
-    drawing: str
     center_of_mass: str | None = None
     mass: float | None = None
-    surroundings: str | None = None
+    scene: str | None = None
     axes: str | None = None
     epoch: str | None = None
     ephemeris_kernel: Annotated[str | None, Use.REPEATED] = None

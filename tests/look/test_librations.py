@@ -6,7 +6,7 @@ import xarray
 from scipy.spatial.transform import Rotation
 
 from rigidsim.look.figures.catalogue import available, figure
-from rigidsim.look.librations import librations
+from rigidsim.look.sources import librations
 
 YEAR = 3.15576e7
 MONTH = 2 * np.pi / (27.3217 * 86400)

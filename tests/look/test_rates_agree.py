@@ -56,8 +56,8 @@ def test_precession_and_nutation(ready: Ready) -> None:
 
 def test_polar_motion(ready: Ready) -> None:
     dataset = ready("earth_free_nutation").dataset
-    pattern = r"([\d.]+ \w+)\n(counter)?clockwise|once round in ([\d.]+ \w+)"
+    pattern = r"once\s+round\s+in ([\d.]+ \w+)"
     said = re.search(pattern, texts(dataset, "polar_motion"))
     assert said is not None
     line = rigidsim.analyse(dataset, ["polar_motion"]).signals[0].lines[0]
-    assert period(said[1] or said[3]) == pytest.approx(line.period, rel=2e-4)
+    assert period(said[1]) == pytest.approx(line.period, rel=2e-4)

@@ -1,6 +1,5 @@
 """Meshes against the closed forms of the polyhedra that they are."""
 
-import json
 from collections import Counter
 from collections.abc import Callable
 
@@ -91,7 +90,7 @@ def test_a_shape_is_one_entry(monkeypatch: pytest.MonkeyPatch, free_body: Callab
     found = build_scene(rigidsim.parse(text)).body
     expected = 3 * 4 * np.array([83 / 320 + 25 / 64, 83 / 320 + 25 / 64, 2 / 5])
     np.testing.assert_allclose([float(m) for m in found.principal_moments], expected, rtol=1e-14)
-    (mesh,) = body_meshes(json.dumps(found.drawing))
+    (mesh,) = body_meshes(found.drawing)
     # an inscribed polyhedron, see the ellipsoid above
     deficit = 1 - mesh.volume() / (2 / 3 * np.pi * 8)
     assert 0 < deficit < (np.pi / 2 / MINOR_SEGMENTS) ** 2 / 2 + (2 * np.pi / SEGMENTS) ** 2 / 2

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from support import run_text, seeds
 
-from rigidsim.look import surroundings
 from rigidsim.look.figures.catalogue import available
-from rigidsim.look.stages.bodies import Subject, source_arrows
+from rigidsim.look.record import scene_of
+from rigidsim.look.stages.bodies import source_arrows
 from rigidsim.look.stages.registry import build_picture
 
 UNITS = {"m/s^2": 1.0, "cm/s^2": 0.01, "km/s^2": 1000.0, "mm/s^2": 0.001, "": 1.0}
@@ -64,7 +64,7 @@ def test_random_fields(seed: int) -> None:
         start, more = "position = [0, 0, 0]\nvelocity = [3, 0, 4]", ', "position"'
     dataset = run_text(TEXT.format(arm=arm, start=start, loads=loads, more=more)).dataset
     up = -pull / np.linalg.norm(pull)
-    assert surroundings.vertical(dataset) == pytest.approx(up, abs=1e-12)
+    assert scene_of(dataset).vertical == pytest.approx(up, abs=1e-12)
     assert ("tip" in available(dataset)) == (kind == "top")
     picture = build_picture(dataset)[0]
     drawn = [vector for stage in picture.stages for vector in stage.vectors if vector.name == "gravity"]
@@ -83,12 +83,13 @@ def test_many_sources(seed: int) -> None:
     dataset = run_text(TEXT.format(arm="[0, 0, 0]", start="", loads="", more="")).dataset
     count = int(rng.integers(100, 300))
     places, strengths = rng.normal(size=(count, 3)) * 1e8, 10 ** rng.uniform(8, 12, count)
-    told = [
+    objects = [
         {"what": "source", "gravitational_parameter": strength, "position": place}
         for place, strength in zip(places.tolist(), strengths.tolist(), strict=True)
     ]
-    dataset = dataset.assign_attrs(surroundings=json.dumps(told))
-    drawn = {arrow.name: arrow.vectors[0] for arrow in source_arrows(dataset, Subject.of(dataset), 1.0)}
+    scene = json.loads(dataset.attrs["scene"]) | {"objects": objects}
+    dataset = dataset.assign_attrs(scene=json.dumps(scene))
+    drawn = {arrow.name: arrow.vectors[0] for arrow in source_arrows(dataset, 1.0)}
     tides = strengths / np.linalg.norm(places, axis=1) ** 3
     seen = np.flatnonzero(tides >= 1e-3 * tides.max())
     assert set(drawn) == {f"source{k}" for k in seen}

@@ -59,7 +59,9 @@ def test_the_cone_of_a_uniform_spin_is_as_wide_as_the_covariance_of_a_straight_l
     covariance = SIGMA**2 * np.linalg.inv(line.T @ line)
     now = np.stack([np.ones(dataset.sizes["time"]), dataset["time"].values], axis=1)
     expected = np.sqrt(np.einsum("ti,ij,tj->t", now, covariance, now))
-    angles = picture.derived["figure_axis_uncertainty"].values
+    (plot,) = picture.plots
+    assert plot.unit == "deg"
+    angles = np.radians(plot.values)
     np.testing.assert_allclose(angles[:, 0], expected, rtol=1e-5)
     np.testing.assert_allclose(angles[:, 1], 0.0, atol=1e-8)
     assert "attitude_error" not in dataset.attrs  # the integration's own, which isn't what is meant here

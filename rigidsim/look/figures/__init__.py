@@ -2,16 +2,14 @@
 
 Importing this package loads matplotlib, so import it only where a figure is drawn; ``look.figure_names``
 has the names of all figures without it. A figure is an entry of ``catalogue.KINDS``: what it needs, and its
-panels (``panel.Panel``: what it finds in a dataset, and how that is drawn).
+panels (``panels.Panel``: what it finds in a dataset, and how that is drawn).
 
 | module | holds |
 | --- | --- |
 | `catalogue` | all figures by name; `figure`, `save_figure`, and the page that suits the scene |
-| `panel`, `composing` | what a panel is, and units of its axes; panels composed to a page |
-| `timelines`, `drift` | panels over time |
-| `poles`, `polhode` | where axes point, and a body's path; polhode, herpolhode, Poinsot's motion |
+| `panels`, `composing` | curves, paths and what only paper shows as panels; panels composed to a page |
+| `polhode`, `gyrostat` | polhode, Poinsot's motion; the momentum's sphere of a body with rotors |
 | `eye` | bodies in three dimensions on plain axes |
-| `librations` | panels of a body that turns one face to its source |
 | `slides` | one panel in large letters, on a light or a dark ground |
 | `style` | colours, fonts, the page's heading, keys |
 | `spectrum`, `work_precision`, `sweep_maps`, `sweep_axes` | figures of `analyse`, `tradeoff` and `sweep` |

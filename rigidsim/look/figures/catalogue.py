@@ -5,28 +5,17 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 
-import numpy as np
 import xarray
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from rigidsim.look import signals
+from rigidsim.look.curves import STATES
 from rigidsim.look.figure_names import FIGURES, OVERVIEW, SPECTRUM
-from rigidsim.look.figures import (
-    changing,
-    gyrostat,
-    librations,
-    poles,
-    polhode,
-    published,
-    sensitivity,
-    timelines,
-)
-from rigidsim.look.figures.composing import compose, shown_rows
-from rigidsim.look.figures.drift import drift
-from rigidsim.look.figures.panel import Panel
+from rigidsim.look.figures.composing import compose, found_of, shown_rows
+from rigidsim.look.figures.panels import OVER_TIME, PLANES
 from rigidsim.look.figures.slides import slide
 from rigidsim.look.figures.style import STYLE
+from rigidsim.look.pages import leading
 
 SUFFIXES = (".png", ".svg")
 _DOTS, _SLIDE_DOTS = 160, 250  # per inch
@@ -35,76 +24,59 @@ _DOTS, _SLIDE_DOTS = 160, 250  # per inch
 @dataclass(frozen=True)
 class Kind:
     """A figure that can be asked for (``FIGURES`` has in a line what it shows): what a run must have for it,
-    in words, its panels over time and its square ones. It can be drawn of a run that has something for one of
-    the latter, or without them for one of the former.
+    in words, and the names of its panels over time and of its square ones. It can be drawn of a run that has
+    something for one of the latter, or without them for one of the former.
     """
 
     needs: str
-    curves: Sequence[Panel] = ()
-    planes: Sequence[Panel] = ()
+    curves: Sequence[str] = ()
+    planes: Sequence[str] = ()
 
     def shows(self, rows: xarray.Dataset) -> bool:
         """Whether it can be drawn of a dataset (in memory)."""
-        return any(panel.shows(rows) for panel in self.planes or self.curves)
+        panels, names = (PLANES, self.planes) if self.planes else (OVER_TIME, self.curves)
+        return any(panels[name].find(rows) is not None for name in names)
 
 
 _TURNS, _ATTITUDE = "angular_velocity recorded", "an attitude recorded"
 _AXIS = "an attitude or an axis (figure_axis, momentum_axis, obliquity) recorded"
 KINDS: dict[str, Kind] = {
-    "polar_motion": Kind("a spin near a principal axis", [timelines.polar_motion], [poles.polar_motion]),
-    "pole_path": Kind(_AXIS, (), [poles.pole_path, poles.nutation]),
-    "nutation": Kind(
-        "a pole that a torque moves, within half a radian of its mean motion", (), [poles.nutation]
-    ),
-    "obliquity": Kind(_AXIS, [timelines.obliquity, timelines.longitude]),
+    "polar_motion": Kind("a spin near a principal axis", ["polar_motion"], ["polar_motion"]),
+    "pole_path": Kind(_AXIS, (), ["pole_path", "nutation"]),
+    "nutation": Kind("a pole that a torque moves, within half a radian of its mean motion", (), ["nutation"]),
+    "obliquity": Kind(_AXIS, ["obliquity", "longitude"]),
     "libration": Kind(
         "libration, roll_pitch_yaw, nadir or source_position recorded",
-        [
-            librations.longitude,
-            librations.latitude,
-            librations.locking,
-            timelines.libration,
-            timelines.roll_pitch_yaw,
-        ],
-        [librations.nadir, librations.phases, librations.locking_phases],
+        ["longitude_libration", "latitude_libration", "locking", "libration", "roll_pitch_yaw"],
+        ["nadir", "phases", "locking_phases"],
     ),
-    "pointing": Kind(
-        "air_velocity, or nadir without libration or roll_pitch_yaw, recorded", [librations.pointing]
-    ),
-    "tip": Kind(
-        "a top: a body on a fixed point under uniform gravity",
-        [timelines.tilt, timelines.precession],
-        [poles.tip],
-    ),
-    "polhode": Kind(_TURNS, (), [polhode.polhode, polhode.poinsot]),
+    "pointing": Kind("air_velocity, or nadir without libration or roll_pitch_yaw, recorded", ["pointing"]),
+    "tip": Kind("a top: a body on a fixed point under uniform gravity", ["tilt", "precession"], ["tip"]),
+    "polhode": Kind(_TURNS, (), ["polhode", "poinsot"]),
     "momentum_sphere": Kind(
         "angular_velocity and rates of rotors recorded, and a momentum of constant size",
         (),
-        [gyrostat.momentum_sphere, gyrostat.momentum_sphere_at_end],
+        ["momentum_sphere", "momentum_sphere_at_end"],
     ),
-    "rotors": Kind("rotors whose rates were recorded", [gyrostat.tilts, gyrostat.rotor_rates]),
-    "herpolhode": Kind("an attitude and a constant momentum", (), [polhode.herpolhode]),
-    "path": Kind("position recorded", (), [poles.path]),
-    "rates": Kind(_TURNS, [timelines.rates, changing.moments]),
-    "core": Kind(
-        "rates of a fluid core and of the mantle recorded",
-        [changing.core_axis, changing.core_slip],
-    ),
+    "rotors": Kind("rotors whose rates were recorded", ["rotor_tilts", "rotor_rates"]),
+    "herpolhode": Kind("an attitude and a constant momentum", (), ["herpolhode"]),
+    "path": Kind("position recorded", (), ["path"]),
+    "rates": Kind(_TURNS, ["rates", "spin_down", "moments"]),
+    "core": Kind("rates of a fluid core and of the mantle recorded", ["core_axis", "core_slip"]),
     "published": Kind(
-        "a published orientation ([output] orientation) and the attitude",
-        [published.angles, published.rotation],
+        "a published orientation ([output] orientation) and the attitude", ["published", "published_rotation"]
     ),
-    "attitude": Kind(_ATTITUDE, [timelines.attitude, timelines.wobble]),
+    "attitude": Kind(_ATTITUDE, ["attitude", "wobble"]),
     "wobble": Kind(
         "a free symmetric body, its attitude, angular_velocity and angular_momentum recorded",
-        [poles.wobble_and_spin],
+        ["wobble_and_spin"],
     ),
-    "states": Kind("user-defined states ([[states]]) recorded", changing.OWN_STATES),
+    "states": Kind("user-defined states ([[states]]) recorded", STATES),
     "sensitivity": Kind(
         "sensitivities ([output] sensitivity)",
-        [sensitivity.attitude, sensitivity.rates, sensitivity.position],
+        ["sensitivity_attitude", "sensitivity_rates", "sensitivity_position"],
     ),
-    "drift": Kind("invariants", [drift]),
+    "drift": Kind("invariants", ["drift"]),
 }
 
 
@@ -123,8 +95,8 @@ def figure(dataset: xarray.Dataset, what: str = OVERVIEW) -> Figure:
     check_name(what)
     shown = shown_rows(dataset)
     if what == OVERVIEW:
-        curves, planes = _leading(shown.rows)
-        return compose(shown, (*curves, drift), planes, facts=True)
+        curves, planes = leading(shown.rows)
+        return compose(shown, (*curves, "drift"), planes, facts=True)
     if what == SPECTRUM:
         raise ValueError("figure 'spectrum': is drawn of an analysis: rigidsim.analyse(run).figure()")
     kind = KINDS[what]
@@ -143,15 +115,11 @@ def for_slides(dataset: xarray.Dataset, what: str = OVERVIEW, ground: str = "lig
     """
     check_name(what)
     shown = shown_rows(dataset)
-    curves, planes = _leading(shown.rows) if what == OVERVIEW else ((), ())
-    if what in KINDS:
-        curves, planes = KINDS[what].curves, KINDS[what].planes
-    panels = [*((panel, True) for panel in curves), *((panel, False) for panel in planes)]
-    if what != OVERVIEW:  # what it is named for
-        panels.sort(key=lambda found: found[1])
-    for panel, over_time in panels:
-        if panel.shows(shown.rows):
-            return slide(shown, panel, ground, over_time=over_time)
+    kind = KINDS[what] if what in KINDS else Kind("", *(leading(shown.rows) if what == OVERVIEW else ()))
+    groups = [(OVER_TIME, kind.curves), (PLANES, kind.planes)]
+    for panels, names in groups if what == OVERVIEW else reversed(groups):  # first what it is named for
+        for name, found in found_of(panels, names, shown.rows):
+            return slide(shown, panels[name], found, ground)
     raise ValueError(
         f"figure {what!r}: this run has no panel of it for a slide; it has {', '.join(available(dataset))}"
     )
@@ -191,61 +159,3 @@ def figure_format(path: Path) -> str:
             f"figure {path.name!r}: the suffix must be one of {', '.join(SUFFIXES)}, given {path.suffix!r}"
         )
     return path.suffix.lower()[1:]
-
-
-def _leading(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
-    """Curves and planes of the page that suits a scene, with rates of rotors and user-defined states."""
-    found = gyrostat.leading(rows, timelines.rates)
-    curves, planes = found or _of_body(rows)
-    wheels = [] if found else [gyrostat.rotor_rates]
-    return [*curves, *wheels, *changing.OWN_STATES], planes
-
-
-def _of_body(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
-    moving = [poles.path] if poles.path.shows(rows) else []
-    attitude = [timelines.rates, timelines.attitude]
-    tilting = [timelines.obliquity, timelines.longitude]
-    if librates(rows):
-        swinging = [timelines.libration, timelines.roll_pitch_yaw, librations.pointing]
-        if librations.latitude.shows(rows):  # its figure axis precesses, as the Moon's
-            swinging = [librations.longitude, librations.latitude, timelines.libration]
-        return swinging, [librations.nadir, *(moving or [librations.phases])]
-    if signals.is_top(rows):
-        turning = timelines.precession if timelines.precession.shows(rows) else timelines.attitude
-        return [timelines.tilt, turning], [poles.tip]
-    if librations.locking.shows(rows):
-        return [timelines.rates, librations.locking], [*moving, librations.locking_phases]
-    if changing.core_axis.shows(rows):
-        tilting = [changing.core_axis, changing.core_slip]
-        precessing = poles.precesses(rows) or not signals.near_axis(rows)
-        return tilting, [*moving, *([poles.polar_motion] if precessing else [poles.pole_path])]
-    if signals.near_axis(rows) and changing.moments.shows(rows):
-        return [timelines.rates, changing.moments, timelines.wobble], [*moving, poles.polar_motion]
-    if signals.near_axis(rows) and changing.OWN_STATES[0].shows(rows):
-        return [timelines.wobble, timelines.rates], [*moving, poles.polar_motion]
-    if signals.near_axis(rows):
-        if poles.precesses(rows) and not moving:
-            return [timelines.braking, *tilting], [poles.nutation, poles.pole_path]
-        wobbling = [poles.wobble_and_spin] if moving else []
-        return [timelines.braking, *wobbling, timelines.polar_motion], [poles.polar_motion, *moving]
-    if moving and librations.pointing.shows(rows):
-        return [librations.pointing, timelines.rates], [*moving, polhode.polhode]
-    if moving:
-        return attitude, [*moving, polhode.polhode]
-    if not any(panel.shows(rows) for panel in attitude):  # only axes are known, as of an averaged model
-        axes = tilting if poles.precesses(rows) else [timelines.wobble]
-        return [timelines.braking, *axes], [poles.nutation, poles.pole_path]
-    if polhode.surfaces(rows) is not None:
-        return attitude, [polhode.polhode, polhode.herpolhode]
-    return attitude, [polhode.polhode]
-
-
-def librates(dataset: xarray.Dataset) -> bool:
-    """Whether the body keeps its attitude to its orbit: the source stays near one body direction."""
-    nadir = librations.toward(dataset)
-    if nadir is None:
-        return signals.values(dataset, "libration") is not None
-    finite = signals.finite_rows(nadir)
-    mean = finite.mean(axis=0) if len(finite) else np.zeros(3)
-    size = float(np.linalg.norm(mean))
-    return size > 0.5 and bool((finite @ mean).min() > 0.5 * size)

@@ -1,7 +1,8 @@
 """Composition of panels to a page: curves over time on the left, planes on the right, facts below."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray
@@ -11,15 +12,15 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 
 from rigidsim.look import signals
-from rigidsim.look.figures import timelines
-from rigidsim.look.figures.panel import Panel, clock
-from rigidsim.look.figures.style import GREY, INK, STYLE, ShownFigure, blank
-from rigidsim.look.page import largest_drift
-from rigidsim.look.signals import by_role, in_words, is_averaged, read_config
+from rigidsim.look.figures.panels import OVER_TIME, PLANES, Panel
+from rigidsim.look.figures.style import GREY, INK, STYLE, blank
+from rigidsim.look.pages import numbers
+from rigidsim.look.plots import Plot, moves
 from rigidsim.look.thinning import thin
+from rigidsim.look.units import clock
 from rigidsim.scene.readable import span_text, unit_for
 
-ROWS, FULL_READ = 20_000, 2_000_000  # that a figure draws; that are read for the largest drift
+ROWS = 20_000  # that a figure draws
 
 _TELLING = 0.5  # changes of sign to a sample: four samples a swing
 _CYCLES, _MANY = 14, 60  # swings shown of the start, where there are more than so many
@@ -30,119 +31,115 @@ _WIDE, _NARROW = 12.4, 8.2
 _PLANES_WIDE = 5.2  # width of a plane where only planes stand side by side
 
 
+_Drawn = Sequence[tuple[Panel, Any]]
+
+
 @dataclass(frozen=True)
 class Shown:
-    """A dataset's rows as a figure shows them, evenly strided, in memory; as many consecutive ones from the
-    start; the largest magnitude of each invariant's drift, and whether every sample was read for it.
+    """A dataset's rows as a figure shows them, evenly strided, in memory; and as many consecutive ones from
+    the start.
     """
 
     rows: xarray.Dataset
     start: xarray.Dataset
-    largest: dict[str, float]
-    complete: bool
 
 
 def shown_rows(dataset: xarray.Dataset) -> Shown:
-    """Read the rows that a figure draws of a dataset, possibly lazy, and all drifts of one not too long."""
-    rows = thin(dataset, ROWS).assign_attrs(dataset.attrs)
-    # A figure of few points shouldn't understate the drifts, unless reading them all takes long.
-    complete = dataset.sizes["time"] <= max(FULL_READ, rows.sizes["time"])
-    whole = dataset if complete else rows
-    largest = {name: largest_drift(drift) for name, drift in by_role(whole, "drift_of").items()}
-    start = rows
+    """Read the rows that a figure draws of a dataset, possibly lazy."""
+    rows = start = thin(dataset, ROWS).assign_attrs(dataset.attrs)
     if dataset.sizes["time"] > rows.sizes["time"]:
         start = thin(dataset.isel(time=slice(0, ROWS)), ROWS).assign_attrs(dataset.attrs)
-    return Shown(rows, start, largest, complete)
+    return Shown(rows, start)
 
 
-def _beginning(axes: Axes, shown: Shown) -> float:
-    """Seconds that hold `_CYCLES` swings of the curves drawn of `shown.start`; 0 if the run has few more."""
+def _beginning(shown: Shown, plot: Plot) -> float:
+    """Seconds that hold `_CYCLES` swings of curves of ``shown.start``; 0 if the run has few more."""
     seconds, whole = signals.seconds(shown.start), signals.seconds(shown.rows)
     length, span = float(seconds[-1] - seconds[0]), float(whole[-1] - whole[0])
     most = 0
-    for line in axes.get_lines():
-        values = np.asarray(line.get_ydata(), dtype=np.float64)
-        values = values[np.isfinite(values)]
-        if len(values) < 50 or not timelines.moves(values):
+    for column in plot.values.T:
+        values = column[np.isfinite(column)]
+        if len(values) < 50 or not moves(values):
             continue
-        values = values - values.mean()
-        changes = int(np.count_nonzero(np.diff(np.signbit(values))))
-        if line.get_linestyle() == "None" and changes > _TELLING * len(values):
-            continue  # samples too sparse to tell swings from a pattern
-        most = max(most, changes)
+        changes = int(np.count_nonzero(np.diff(np.signbit(values - values.mean()))))
+        if changes < _TELLING * len(values):  # else samples too sparse to tell swings from a pattern
+            most = max(most, changes)
     if length <= 0 or most / 2 * span / length <= _MANY:
         return 0.0
     return 2 * _CYCLES * length / most
 
 
 def compose(
-    shown: Shown, curves: Sequence[Panel] = (), planes: Sequence[Panel] = (), *, facts: bool = False
+    shown: Shown, curves: Sequence[str] = (), planes: Sequence[str] = (), *, facts: bool = False
 ) -> Figure:
     """A page of those panels for which there is data: curves over a common time axis, planes beside
-    them or side by side, and below these a table of what was run and what was conserved, if wanted.
+    them or side by side, and below these a table of the motion's own numbers, if wanted.
     """
-    curves = [panel for panel in curves if panel.shows(shown.rows)]
-    planes = [panel for panel in planes if panel.shows(shown.rows)]
-    table = facts_of(shown) if facts else []
+    over_time = [(OVER_TIME[name], found) for name, found in found_of(OVER_TIME, curves, shown.rows)]
+    beside = [(PLANES[name], found) for name, found in found_of(PLANES, planes, shown.rows)]
+    table = numbers(shown.rows) if facts else []
     with rc_context(STYLE):  # type: ignore[arg-type]
-        figure = _side_by_side(shown.rows, planes) if planes and not curves and not table else None
-        if figure is None:
-            figure = _two_columns(shown, curves, planes, table)
+        if beside and not over_time and not table:
+            figure = blank(shown.rows, max(_PLANES_WIDE * len(beside), 6.4), 5.2)
+            places = figure.subplots(1, len(beside), squeeze=False)[0]
+            for axes, (panel, found) in zip(places, beside, strict=True):
+                panel.draw(axes, shown.rows, found)
+        else:
+            figure = _two_columns(shown, over_time, beside, table)
         figure.draw_without_rendering()  # the layout finds its sizes in this round and that of drawing
     return figure
 
 
-def _side_by_side(rows: xarray.Dataset, planes: Sequence[Panel]) -> Figure:
-    figure = blank(rows, max(_PLANES_WIDE * len(planes), 6.4), 5.2)
-    for axes, panel in zip(figure.subplots(1, len(planes), squeeze=False)[0], planes, strict=True):
-        panel.draw(axes, rows)
-    return figure
+def found_of(
+    panels: Mapping[str, Panel], names: Sequence[str], rows: xarray.Dataset
+) -> list[tuple[str, Any]]:
+    """Names of those panels that a dataset has something for, with that."""
+    found = ((name, panels[name].find(rows)) for name in names)
+    return [(name, one) for name, one in found if one is not None]
 
 
-def _two_columns(
-    shown: Shown, curves: Sequence[Panel], planes: Sequence[Panel], table: list[tuple[str, str]]
-) -> Figure:
+def _two_columns(shown: Shown, curves: _Drawn, planes: _Drawn, table: list[tuple[str, str]]) -> Figure:
     rows = shown.rows
     right = bool(planes or table)
     below = _FACT * (len(table) + 1) if table else 0.0
     left_height = _CURVE * len(curves) if len(curves) > 1 else 3.6 * len(curves)
     height = max(left_height, _PLANE * len(planes) + below, 2.6)
-    figure = blank(rows, _WIDE if right and curves else _NARROW, height)
-    outer = figure.add_gridspec(
-        1, 2 if right and curves else 1, width_ratios=[1.38, 1.0] if right and curves else None
-    )
+    both = bool(right and curves)
+    figure = blank(rows, _WIDE if both else _NARROW, height)
+    outer = figure.add_gridspec(1, 1 + both, width_ratios=[1.38, 1.0] if both else None)
     if curves:
         grid = outer[0].subgridspec(len(curves), 1)
-        for k, panel in enumerate(curves):
-            _curve_panel(figure, grid[k], panel, shown, lowest=k == len(curves) - 1)
+        for k, (panel, plot) in enumerate(curves):
+            _curve_panel(figure, grid[k], panel, plot, shown, lowest=k == len(curves) - 1)
     if right:
         heights = [_PLANE] * len(planes) + ([below] if table else [])
         spare = height - sum(heights)
-        grid = outer[-1].subgridspec(
-            len(heights) + (spare > 0.1), 1, height_ratios=heights + ([spare] if spare > 0.1 else [])
-        )
-        for row, panel in enumerate(planes):
-            panel.draw(figure.add_subplot(grid[row]), rows)
+        heights += [spare] if spare > 0.1 else []
+        grid = outer[-1].subgridspec(len(heights), 1, height_ratios=heights)
+        for row, (panel, found) in enumerate(planes):
+            panel.draw(figure.add_subplot(grid[row]), rows, found)
         if table:
             _table(figure.add_subplot(grid[len(planes)]), table)
     return figure
 
 
-def _curve_panel(figure: Figure, place: SubplotSpec, panel: Panel, shown: Shown, *, lowest: bool) -> None:
+def _curve_panel(
+    figure: Figure, place: SubplotSpec, panel: Panel, plot: Plot, shown: Shown, *, lowest: bool
+) -> None:
     """Draw it over the whole run; of more swings than can be seen there as a band between the extremes, with
     the first of them beside it.
     """
-    begins = first_swings(panel, shown)
+    begins = first_swings(panel, plot, shown)
     if not begins:
         axes = figure.add_subplot(place)
-        panel.draw(axes, shown.rows)
-        timelines.time_axis(axes, shown.rows, labelled=lowest)
+        panel.draw(axes, shown.rows, plot)
+        time_axis(axes, shown.rows, labelled=lowest)
         return
     parts = place.subgridspec(1, 2, width_ratios=[1.7, 1.0], wspace=0.03)
     whole, first = (figure.add_subplot(parts[k]) for k in range(2))
-    panel.draw(whole, shown.rows)
+    panel.draw(whole, shown.rows, plot)
     _as_band(whole)
-    timelines.time_axis(whole, shown.rows, labelled=True)
+    time_axis(whole, shown.rows, labelled=True)
     draw_first(first, panel, shown, begins)
     legend = first.get_legend()
     if legend is not None:
@@ -151,19 +148,26 @@ def _curve_panel(figure: Figure, place: SubplotSpec, panel: Panel, shown: Shown,
     first.set_title(f"the first {span_text(begins, 2)}", fontweight="normal", color=GREY)
 
 
-def first_swings(panel: Panel, shown: Shown) -> float:
+def time_axis(axes: Axes, dataset: xarray.Dataset, *, labelled: bool) -> None:
+    """Set a panel's limits to the run's; label the lowest panel."""
+    time, _, label = clock(dataset)
+    if time[0] != time[-1]:
+        axes.set_xlim(time[0], time[-1])
+    axes.tick_params(labelbottom=labelled)
+    if labelled:
+        axes.set_xlabel(label)
+
+
+def first_swings(panel: Panel, plot: Plot, shown: Shown) -> float:
     """Seconds of the start that a panel shows by itself; 0 if the whole run can be followed."""
-    if not panel.begins:
-        return 0.0
-    trial = ShownFigure(figsize=(6.0, 3.0)).add_subplot()
-    panel.draw(trial, shown.start)
-    return _beginning(trial, shown)
+    start = panel.find(shown.start) if plot.begins else None
+    return 0.0 if start is None else _beginning(shown, start)
 
 
 def draw_first(axes: Axes, panel: Panel, shown: Shown, begins: float) -> None:
     """Draw a panel over so many seconds of the start, in a unit of time that suits them."""
     start = shown.start.assign_attrs(time_unit=unit_for(begins).symbol)
-    panel.draw(axes, start)
+    panel.draw(axes, start, panel.find(start))
     for line in axes.get_lines():
         if line.get_linestyle() == "None":  # few enough now to be told apart, and to be followed
             line.set(linestyle="-", linewidth=0.6, markersize=5.0)
@@ -184,33 +188,6 @@ def _as_band(axes: Axes) -> None:
         color = line.get_color()
         axes.fill_between(places, low, high, color=color, alpha=0.35, lw=0.6)
         line.set(visible=False)
-
-
-def facts_of(shown: Shown) -> list[tuple[str, str]]:
-    """Table rows of what was run and what was conserved."""
-    dataset = shown.rows
-    integrator = read_config(dataset).get("integrator", {})
-    status = str(dataset.attrs.get("status", ""))
-    kind = "model" if is_averaged(dataset.attrs) else "formulation"
-    lines = [
-        (name, str(value))
-        for name, value in (
-            ("status", status if status != "finished" else ""),
-            (kind, dataset.attrs.get("formulation") or integrator.get("formulation")),
-            ("precision", dataset.attrs.get("precision") or integrator.get("precision")),
-            ("tolerance", integrator.get("tolerance")),
-            ("steps", dataset.attrs.get("steps")),
-        )
-        if value not in (None, "")
-    ]
-    if "attitude_error" in dataset.attrs:
-        what = "axis integrated to" if is_averaged(dataset.attrs) else "attitude uncertain by"
-        lines.append((what, f"{float(dataset.attrs['attitude_error']):.1e} rad"))
-    bound = "" if shown.complete else "≥ "  # of the samples that were read
-    for name, drift in shown.largest.items():
-        largest = f"{drift:.1e}" if drift else "0"
-        lines.append((f"largest drift, {in_words(name)}", bound + largest))
-    return lines
 
 
 def _table(axes: Axes, lines: list[tuple[str, str]]) -> None:

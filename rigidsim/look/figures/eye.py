@@ -14,10 +14,10 @@ from matplotlib.colors import to_rgb
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from rigidsim.look.figures.panel import number
 from rigidsim.look.figures.style import PALE, PINK, X, Y, Z
 from rigidsim.look.signals import joined
 from rigidsim.look.solids import Array
+from rigidsim.look.units import number
 
 Mask = NDArray[np.bool_]
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from rigidsim.look.figures import sweep_axes
 from rigidsim.look.figures.style import GREY, INK, PALETTE, blank, key, titled
-from rigidsim.look.plots import pretty_unit
+from rigidsim.look.units import pretty_unit
 
 _MOST_PANELS = 14
 _COLUMNS = 2

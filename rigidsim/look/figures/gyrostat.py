@@ -1,11 +1,11 @@
-"""Bodies with rotors: the sphere of their momentum, with its equilibria, and their rotors over time.
+"""The sphere of the momentum of a body with rotors, with its equilibria.
 
 In body axes the momentum moves on a sphere, along levels of the energy if no motor works. Of a body without
 rotors they are the polhodes; rotors move equilibria, and let them merge.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,13 +15,10 @@ from matplotlib.lines import Line2D
 
 from rigidsim.look import gyrostats, signals
 from rigidsim.look.figures import eye as eyes
-from rigidsim.look.figures.panel import Find, Panel, number, panel
-from rigidsim.look.figures.style import GREY, INK, PALETTE, PINK, X, Y, key
-from rigidsim.look.figures.timelines import angles_over_time, lines
+from rigidsim.look.figures.style import GREY, INK, PINK, X, Y, key
 from rigidsim.look.gyrostats import Gyrostat
 from rigidsim.look.solids import Array
-from rigidsim.look.surroundings import has_rotors
-from rigidsim.scene.readable import si_scale
+from rigidsim.look.units import number
 
 _GROUND, _LEVEL = "#dfe7f1", "#7f97b8"
 _LEVELS, _FINE = 12, 401  # levels, at equal shares of the sphere; points of the grid that they are found on
@@ -38,7 +35,7 @@ class Sphere:
     title: str
 
 
-def _sphere(row: int) -> Find:
+def sphere(row: int) -> Callable[[xarray.Dataset], Sphere | None]:
     """That with the levels at the first row, or at the last if motors have changed them."""
 
     def find(dataset: xarray.Dataset) -> Sphere | None:
@@ -56,7 +53,7 @@ def _sphere(row: int) -> Find:
     return find
 
 
-def _draw(axes: Axes, dataset: xarray.Dataset, found: Sphere) -> None:
+def draw_sphere(axes: Axes, dataset: xarray.Dataset, found: Sphere) -> None:
     """Levels of the energy, separatrices, equilibria, and the path of the run."""
     gyrostat, view = found.gyrostat, _view(dataset, found.directions)
     covered = eyes.draw_ellipsoid(axes, view, _ONES, _GROUND)
@@ -117,52 +114,3 @@ def _view(dataset: xarray.Dataset, directions: Array) -> eyes.Eye:
             if quality > best:
                 best, found = quality, toward
     return eyes.eye_at(found)
-
-
-momentum_sphere, momentum_sphere_at_end = (Panel(_sphere(row), _draw) for row in (0, -1))
-
-
-def _tilts(dataset: xarray.Dataset) -> dict[str, Array] | None:
-    """Angles (rows,), rad, of the rotors' axes from the momentum."""
-    whole = gyrostats.momentum(dataset)
-    if whole is None:
-        return None
-    found = {rotor.name: signals.angle_between(whole, rotor.axis) for rotor in gyrostats.rotors(dataset)}
-    return found or None
-
-
-@panel(_tilts, begins=True)
-def tilts(axes: Axes, dataset: xarray.Dataset, angles: dict[str, Array]) -> None:
-    """Angles of the rotors' axes from the angular momentum."""
-    labels: list[str | None] = [*angles]
-    title = "Axes of the rotors, from the angular momentum"
-    if len(angles) == 1:
-        title, labels = f"Axis of rotor {labels[0]}, from the angular momentum", [None]
-    angles_over_time(axes, dataset, np.stack([*angles.values()], axis=1), title, hues=PALETTE, labels=labels)
-
-
-def _varying(dataset: xarray.Dataset) -> dict[str, Array] | None:
-    found = gyrostats.rotors(dataset)
-    return {rotor.name: rotor.rate for rotor in found} if any(rotor.varies for rotor in found) else None
-
-
-@panel(_varying, begins=True)
-def rotor_rates(axes: Axes, dataset: xarray.Dataset, rates: dict[str, Array]) -> None:
-    """Rates of the rotors relative to the body, if one changes."""
-    table = np.stack([*rates.values()], axis=1)
-    scale, unit = si_scale(table, "rad/s")
-    lines(axes, dataset, table / scale, [*rates], PALETTE)
-    key(axes, "Rates of the rotors, relative to the body")
-    axes.set_ylabel(f"rate [{unit}]")
-
-
-def leading(dataset: xarray.Dataset, rates: Panel) -> tuple[Sequence[Panel], Sequence[Panel]] | None:
-    """Curves, with `rates` of the body among them, and planes of the page of a body with rotors whose
-    momentum stays; None for others. What motors do takes the whole run.
-    """
-    if not has_rotors(dataset) or not momentum_sphere.shows(dataset):
-        return None
-    curves = [tilts, rotor_rates, rates]
-    if any(rotor.drive == "driven" for rotor in gyrostats.rotors(dataset)):
-        curves = [replace(curve, begins=False) for curve in curves]
-    return curves, [momentum_sphere, momentum_sphere_at_end]

@@ -15,11 +15,12 @@ from matplotlib.patches import Patch
 
 from rigidsim.look import signals
 from rigidsim.look.figures import eye as eyes
-from rigidsim.look.figures.panel import number, panel
-from rigidsim.look.figures.poles import path_about
 from rigidsim.look.figures.style import GREY, PINK, Z, key, titled
+from rigidsim.look.paths import herpolhode_plane
+from rigidsim.look.record import scene_of
 from rigidsim.look.solids import Array, rotation_matrix
 from rigidsim.look.thinning import thinned_indices
+from rigidsim.look.units import number
 from rigidsim.scene.readable import si_scale
 
 ENERGY_SURFACE, MOMENTUM_SURFACE = "#b9cde6", "#f0d3ae"
@@ -61,10 +62,9 @@ def separatrix(moments: Array, radii: Array) -> list[Array]:
     return curves
 
 
-@panel(signals.principal_rates)
-def polhode(axes: Axes, dataset: xarray.Dataset, rates: Array) -> None:
+def draw_polhode(axes: Axes, dataset: xarray.Dataset, rates: Array) -> None:
     """The tip of the angular velocity in principal axes, on the surfaces where it has some."""
-    found, moments = surfaces(dataset), signals.moments(dataset)
+    found, moments = surfaces(dataset), scene_of(dataset).moments
     names = [f"$ω_{name}$" for name in signals.axis_names(dataset)]
     if found is None or moments is None:
         _bare(axes, rates, names)
@@ -135,42 +135,22 @@ def _bare(axes: Axes, rates: Array, names: list[str]) -> None:
     titled(axes, f"Path of ω in body axes [{unit}]")
 
 
-def herpolhode_path(dataset: xarray.Dataset) -> Array | None:
-    """Component of the angular velocity across the momentum (rows, 2), rad/s; None if the momentum moves."""
-    along = signals.steady_momentum(dataset)
-    rates, quaternion = signals.values(dataset, "angular_velocity"), signals.values(dataset, "quaternion")
-    if along is None or rates is None or quaternion is None:
-        return None
-    first, second = signals.across(along)
-    in_space = np.einsum("tij,tj->ti", rotation_matrix(quaternion), rates)
-    return np.stack([in_space @ first, in_space @ second], axis=1)
-
-
-@panel(herpolhode_path)
-def herpolhode(axes: Axes, dataset: xarray.Dataset, plane: Array) -> None:
-    """The tip of the angular velocity on the invariable plane, seen along the momentum."""
-    scale, unit = si_scale(plane, "rad/s")
-    path_about(axes, plane / scale, f"across L [{unit}]", f"across L [{unit}]")
-    key(axes, "Herpolhode on the invariable plane (+: L)")
-
-
-def _rolling(dataset: xarray.Dataset) -> tuple[Array, Array, Array, Array] | None:
+def rolling(dataset: xarray.Dataset) -> tuple[Array, Array, Array, Array] | None:
     """Semi-axes (3,) of the ellipsoid of energy, herpolhode (rows, 2), angular velocity (rows, 3) along the
     principal axes, rad/s, and the rotation (3, 3) from these to the picture's axes at the first sample.
     """
-    found, plane, rates = surfaces(dataset), herpolhode_path(dataset), signals.principal_rates(dataset)
+    found, plane, rates = surfaces(dataset), herpolhode_plane(dataset), signals.principal_rates(dataset)
     quaternion, along = signals.values(dataset, "quaternion"), signals.steady_momentum(dataset)
     if found is None or plane is None or rates is None or quaternion is None or along is None:
         return None
     # The picture's axes: across, across, and -L upwards, so that the plane lies below the body.
     first, second = signals.across(along)
     to_picture = np.stack([first, -second, -along])
-    matrix = rotation_matrix(quaternion[:1])[0] @ signals.principal_axes(dataset).T
+    matrix = rotation_matrix(quaternion[:1])[0] @ scene_of(dataset).axes.T
     return found[0], plane, rates, to_picture @ matrix
 
 
-@panel(_rolling)
-def poinsot(axes: Axes, dataset: xarray.Dataset, found: tuple[Array, Array, Array, Array]) -> None:
+def draw_poinsot(axes: Axes, dataset: xarray.Dataset, found: tuple[Array, Array, Array, Array]) -> None:
     """The ellipsoid of energy as it rolls on the invariable plane, at the first sample."""
     scale, _ = si_scale(found[0], "rad/s")
     radii, path, points = (values / scale for values in found[:3])

@@ -6,17 +6,16 @@ from typing import Any
 
 from matplotlib import rc_context
 from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 from matplotlib.axis import Tick
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.spines import Spine
 from matplotlib.text import Text
 
-from rigidsim.look.figures import timelines
-from rigidsim.look.figures.composing import Shown, draw_first, first_swings
-from rigidsim.look.figures.panel import Panel
+from rigidsim.look.figures.composing import Shown, draw_first, first_swings, time_axis
+from rigidsim.look.figures.panels import Panel
 from rigidsim.look.figures.style import PALE, STYLE, blank
+from rigidsim.look.plots import Plot
 
 GROUNDS = ("light", "dark")
 _DARK, _BRIGHT, _GRID = "#14171d", "#f1f3f5", "#2c323c"
@@ -27,7 +26,7 @@ _THICK = 1.5  # lines, times
 _LUMINOUS = 0.45  # relative luminance, below which a colour is raised on a dark ground
 
 
-def slide(shown: Shown, panel: Panel, ground: str, *, over_time: bool) -> Figure:
+def slide(shown: Shown, panel: Panel, found: Any, ground: str) -> Figure:
     """One panel of a run; of many swings over time the first, as they can be followed on a wall.
 
     Raises:
@@ -40,23 +39,17 @@ def slide(shown: Shown, panel: Panel, ground: str, *, over_time: bool) -> Figure
     with rc_context(style):  # type: ignore[arg-type]
         figure = blank(shown.rows, _WIDE, _HIGH)
         axes = figure.add_subplot()
-        if over_time:
-            _over_time(axes, panel, shown)
+        begins = first_swings(panel, found, shown) if isinstance(found, Plot) else 0.0
+        if begins:
+            draw_first(axes, panel, shown, begins)
         else:
-            panel.draw(axes, shown.rows)
+            panel.draw(axes, shown.rows, found)
+        if isinstance(found, Plot) and not begins:
+            time_axis(axes, shown.rows, labelled=True)
         if ground == "dark":
             darkened(figure)
         figure.draw_without_rendering()
     return figure
-
-
-def _over_time(axes: Axes, panel: Panel, shown: Shown) -> None:
-    begins = first_swings(panel, shown)
-    if begins:
-        draw_first(axes, panel, shown, begins)
-    else:
-        panel.draw(axes, shown.rows)
-        timelines.time_axis(axes, shown.rows, labelled=True)
 
 
 def _is_size(key: str) -> bool:

@@ -17,14 +17,17 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import MaxNLocator
 
-from rigidsim.look.signals import joined, read_config, title_of
+from rigidsim.look.plots import HUES, XYZ
+from rigidsim.look.plots import PALETTE as NAMES
+from rigidsim.look.record import read_config
+from rigidsim.look.signals import joined, title_of
 from rigidsim.look.solids import Array
 
-X, Y, Z = "#d1495b", "#3a9a5b", "#2f6fbf"
-BLUE, ORANGE, VIOLET, TEAL, PINK = "#2f6fbf", "#d9822b", "#8f5bb5", "#17a2b0", "#c2327a"
-INK, GREY, PALE = "#1b2733", "#6b7280", "#c3cbd5"
+PALETTE = tuple(HUES[name][0] for name in NAMES)
+X, Y, Z = (HUES[name][0] for name in XYZ)
+BLUE, ORANGE, VIOLET, PINK, GREY = (HUES[n][0] for n in ("blue", "orange", "violet", "pink", "grey"))
+INK, PALE = "#1b2733", "#c3cbd5"
 START = "#0d0887"
-PALETTE = (BLUE, ORANGE, VIOLET, Y, X, TEAL, "#8c6d46", GREY)
 
 MOST_VECTOR_POINTS = 6000  # of a curve in an SVG; longer ones become pixels there
 _OVER_TIME = 0.8  # radii of the whole between neighbours that are joined: some eight samples a turn

@@ -7,8 +7,8 @@ import xarray
 from matplotlib.axis import Axis
 from matplotlib.ticker import MaxNLocator
 
-from rigidsim.look.plots import pretty_unit
 from rigidsim.look.solids import Array
+from rigidsim.look.units import pretty_unit
 
 _MOST_TOLD = 12  # values that are told at their ticks
 _CROWDED = 60  # characters side by side

@@ -7,8 +7,8 @@ from __future__ import annotations
 import numpy as np
 import xarray
 
-from rigidsim.look.plots import pretty_unit
-from rigidsim.look.signals import read_config
+from rigidsim.look.record import read_config
+from rigidsim.look.units import pretty_unit
 from rigidsim.scene.readable import DAY, angle_unit, largest, unit_of
 
 _STILL = 1e-9  # variation between members, relative to the largest, that is rounding

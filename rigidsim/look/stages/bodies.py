@@ -1,15 +1,14 @@
 """A body as stages draw it: meshes in units of its reach, arrows and trails of its motion, the camera."""
 
-import json
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
 import xarray
 
-from rigidsim.look import signals, surroundings
-from rigidsim.look.signals import read_config, values
+from rigidsim.look import signals, sources
+from rigidsim.look.record import called, color_of, named_body, scene_of
+from rigidsim.look.signals import values
 from rigidsim.look.solids import Mesh, ball, body_meshes, point_positions, rotation_matrix
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.parts import Array, Arrow, Camera, Stage, Trail
@@ -43,21 +42,20 @@ class Subject:
     @classmethod
     def of(cls, dataset: xarray.Dataset) -> Self:
         """The body of a dataset in memory; ``ValueError`` for an unreadable ``drawing``."""
-        drawing = dataset.attrs.get("drawing")
-        meshes = body_meshes(drawing)
-        solids = json.loads(drawing) if drawing else []
-        host = _globe_of_host(dataset) if solids and solids[0].get("equivalent") else None
+        solids = scene_of(dataset).drawing
+        meshes, points = body_meshes(solids), point_positions(solids)
+        host = named_body(scene_of(dataset).host) if solids and solids[0].get("equivalent") else None
         if host is not None:  # known by its moments alone, but by its name as well
             meshes, solids = [ball(host.radius, host.radius, host.radius)], [_sphere(host)]
         reach = max(mesh.reach() for mesh in meshes)
-        quaternion = column(dataset, "quaternion", 4)
+        quaternion = values(dataset, "quaternion", 4)
         return cls(
             reach=reach,
             meshes=[mesh.scaled(1 / reach) for mesh in meshes],
-            points=point_positions(drawing) / reach,
+            points=points / reach,
             quaternion=quaternion,
             attitude=None if quaternion is None else rotation_matrix(quaternion),
-            position=column(dataset, "position", 3),
+            position=values(dataset, "position", 3),
             solids=solids,
         )
 
@@ -96,21 +94,8 @@ class Subject:
         return axes[2] if spread[2] < _FLAT * spread[1] else None
 
 
-def _globe_of_host(dataset: xarray.Dataset) -> KnownBody | None:
-    """The known body that a kernel's scene is about."""
-    config = read_config(dataset)
-    body = config.get("body", {})
-    return surroundings.named_body(str(body.get("host", ""))) if "ephemeris" in config else None
-
-
 def _sphere(body: KnownBody) -> dict[str, Any]:
     return {"solid": "sphere", "dimensions": {"radius": body.radius}, "name": body.name.lower()}
-
-
-def column(dataset: xarray.Dataset, name: str, width: int) -> Array | None:
-    """A vector variable along time, (rows, width); None if there is none of that width."""
-    found = values(dataset, name)
-    return found if found is not None and found.ndim == 2 and found.shape[1] == width else None
 
 
 def vectors_of(
@@ -121,7 +106,7 @@ def vectors_of(
     trails: list[Trail] = []
     notes: list[str] = []
     attitude = subject.attitude
-    momentum = column(dataset, "angular_momentum", 3)
+    momentum = values(dataset, "angular_momentum", 3)
     if momentum is not None and attitude is not None and parts.longest(momentum) > 0:
         factor = parts.ARROW_REACH / parts.longest(momentum)
         words = "angular momentum L"
@@ -129,7 +114,7 @@ def vectors_of(
             Arrow("angular_momentum", "L", parts.MOMENTUM, momentum * factor, False, words, label_at=1.09)
         )
         notes.append(f"{words} (yellow), space axes: 1 unit = {1 / factor:.6g} kg m²/s")
-    rates = column(dataset, "angular_velocity", 3)
+    rates = values(dataset, "angular_velocity", 3)
     if rates is not None and parts.longest(rates) > 0:
         factor = parts.ARROW_REACH / parts.longest(rates)
         in_body = rates * factor
@@ -139,7 +124,7 @@ def vectors_of(
             Arrow("angular_velocity", "ω", parts.VELOCITY, tip, attitude is None, words, label_at=at)
         )
         notes.append(f"{words} (cyan): 1 unit = {1 / factor:.6g} rad/s")
-        core = column(dataset, "core_angular_velocity", 3)
+        core = values(dataset, "core_angular_velocity", 3)
         if core is not None:
             shown = core * factor if attitude is None else np.einsum("tij,tj->ti", attitude, core * factor)
             words = "angular velocity of the core"
@@ -160,51 +145,16 @@ def vectors_of(
     return arrows, trails, notes
 
 
-def source_arrows(dataset: xarray.Dataset, subject: Subject, length: float) -> list[Arrow]:
-    """Directions in space to attracting bodies: from orbits, recorded point masses, or the recorded nadir."""
+def source_arrows(dataset: xarray.Dataset, length: float) -> list[Arrow]:
+    """Directions in space to attracting bodies, without those whose tide is a thousandth of the strongest."""
+    pulling = sources.sources(dataset)
+    strongest = max((one.tide for one in pulling), default=0.0)
     arrows = []
-    for key, body, name, path in [*_masses(dataset), *_sources(dataset, subject)]:
-        way = length * path / np.linalg.norm(path, axis=1, keepdims=True)
-        called, color = surroundings.called(body, name), surroundings.color_of(body, parts.SOURCE)
-        arrows.append(Arrow(key, f"to {called}", color, way, False, f"direction of {called}"))
+    for one in [*sources.point_masses(dataset), *(x for x in pulling if x.tide >= _WEAK * strongest)]:
+        way = length * one.path / signals.norms(one.path)[:, None]
+        name, color = called(one.body, one.name), color_of(one.body, parts.SOURCE)
+        arrows.append(Arrow(one.key, f"to {name}", color, way, False, f"direction of {name}"))
     return arrows
-
-
-_Towards = Iterator[tuple[str, KnownBody | None, str, Array]]
-"""Key, known body, name, and vectors (rows, 3), space axes, to attracting bodies."""
-
-
-def _sources(dataset: xarray.Dataset, subject: Subject) -> _Towards:
-    """Sources of torque, without those whose tide is below a thousandth of the strongest tide."""
-    found = []
-    listed = surroundings.told(dataset, "source")
-    nadir = column(dataset, "nadir", 3)
-    for number, one in enumerate(listed):
-        path = surroundings.source_path(one, dataset, signals.seconds(dataset))
-        if path is None and nadir is not None and len(listed) == 1 and subject.attitude is not None:
-            path = np.einsum("tij,tj->ti", subject.attitude, nadir)
-        if path is not None:
-            name = str(one.get("ephemeris", one.get("kernel", "source")))
-            tide = float(one.get("gravitational_parameter") or 0.0) / float(
-                np.nanmean(signals.norms(path) ** 3)
-            )
-            found.append((tide, (f"source{number}", surroundings.body_of(one), name, path)))
-    strongest = max((tide for tide, _ in found), default=0.0)
-    yield from (entry for tide, entry in found if tide >= _WEAK * strongest)
-
-
-def _masses(dataset: xarray.Dataset) -> _Towards:
-    """Point masses whose positions were recorded, from the body if it is one of them."""
-    positions = signals.values(dataset, "point_mass_position")
-    body = read_config(dataset).get("body", {})
-    host = str(body.get("host", "")) if isinstance(body, dict) else ""
-    if positions is None or "point_mass" not in dataset["point_mass_position"].coords:
-        return
-    names = [str(name) for name in dataset["point_mass_position"].coords["point_mass"].values]
-    for number, name in enumerate(names):
-        if host in names and name != host:
-            path = positions[:, number] - positions[:, names.index(host)]
-            yield f"mass{number}", surroundings.named_body(name), name, path
 
 
 def eye_at(

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import xarray
 
-from rigidsim.look import signals, surroundings
-from rigidsim.look.librations import pointing_angle
+from rigidsim.look import signals
+from rigidsim.look.record import body_of, called, color_of, scene_of
 from rigidsim.look.solids import rotation_matrix
+from rigidsim.look.sources import kepler_path, orbit_normal
 from rigidsim.look.stages import bodies, parts
-from rigidsim.look.stages.bodies import FIELD, Subject, column, direction_of, plane_view, vectors_of
+from rigidsim.look.stages.bodies import FIELD, Subject, direction_of, plane_view, vectors_of
 from rigidsim.look.stages.parts import SPACE, Array, Arrow, Camera, Line, Picture, Solid, Spot, Stage, Vector
-from rigidsim.look.surroundings import called, color_of
 from rigidsim.look.symbols import globe, graticule
 from rigidsim.scene.bodies.presets import KnownBody
 from rigidsim.scene.rotations import quaternion_of
@@ -29,68 +29,54 @@ _DOT = 0.05  # radius of a planet in the view of an orbit, at least
 
 def free_orbit(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     """Picture of a body with a position and one attracting point; None for others."""
-    listed = surroundings.told(dataset, "attractor")
+    listed = scene_of(dataset).attractors
     if len(listed) != 1 or subject.position is None:
         return None
     position = subject.position - np.asarray(listed[0]["position"], dtype=float)
-    planet = surroundings.body_of(listed[0])
+    planet = body_of(listed[0])
     arrows, trails, notes = vectors_of(dataset, subject, paths=False)
     name = called(planet, "attracting point")
     down = -position / np.linalg.norm(position, axis=1, keepdims=True)
     arrows.append(Arrow("nadir", f"to {name}", parts.SOURCE, 1.6 * down, False, f"direction of {name}"))
-    air = column(dataset, "air_velocity", 3)
+    air = signals.values(dataset, "air_velocity", 3)
     if air is not None:
         oncoming = 1.6 * air / signals.norms(air)[:, None]
         arrows.append(Arrow("air", "air", FORWARD, oncoming, True, "where the air comes from"))
     close = subject.stage(arrows, trails, "Body, seen in space axes")
     stages = [close, _orbit(subject, position, planet, notes)]
-    pointing = _pointing(dataset)
-    leading = ("libration", *pointing, "angular_velocity")
-    return Picture("orbit about an attracting point", stages, [], leading, notes, pointing)
+    return Picture("orbit about an attracting point", stages, notes)
 
 
 def satellite(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     """Picture of a small body with a single source on an orbit, its attitude known in space or in the local
     frame; None for others.
     """
-    listed = [one for one in surroundings.told(dataset, "source") if "orbit" in one]
+    listed = [one for one in scene_of(dataset).sources if "orbit" in one]
     unsized = subject.solids and subject.solids[0].get("equivalent")  # known by its moments alone
     large = subject.reach > _LARGE and not unsized
     if len(listed) != 1 or subject.position is not None or large:
         return None
     orbit = listed[0]["orbit"]
-    source = surroundings.kepler_path(orbit, signals.seconds(dataset))
+    source = kepler_path(orbit, signals.seconds(dataset))
     # The normal of the satellite's orbit: as seen from the planet it goes about it in the same sense.
-    local = local_frame(-source, surroundings.orbit_normal(orbit))
+    local = local_frame(-source, orbit_normal(orbit))
     quaternion = subject.quaternion
     if quaternion is None:
-        angles = column(dataset, "roll_pitch_yaw", 3)
+        angles = signals.values(dataset, "roll_pitch_yaw", 3)
         if angles is None or not np.isfinite(angles).all():
             return None
         quaternion = quaternion_of(local @ _turned(angles))
-    planet = surroundings.body_of(listed[0])
+    planet = body_of(listed[0])
     known = replace(subject, quaternion=quaternion, attitude=rotation_matrix(quaternion))
     notes = []
     if not _is_far(source, planet):
         notes.append("in the local frame the planet's surface is drawn near the body, and not to scale")
-    whole = -surroundings.kepler_path(orbit, _revolution(orbit))
+    whole = -kepler_path(orbit, _revolution(orbit))
     stages = [
         _in_local_frame(dataset, known, local, planet, far=_is_far(source, planet)),
         _orbit(known, -source, planet, notes, whole),
     ]
-    pointing = _pointing(dataset)
-    leading = ("libration", "roll_pitch_yaw", *pointing, "angular_velocity")
-    return Picture("satellite on its orbit", stages, [], leading, notes, pointing)
-
-
-def _pointing(dataset: xarray.Dataset) -> dict[str, xarray.DataArray]:
-    """The angle of a body axis from the oncoming air or the source, for a plot."""
-    found = pointing_angle(dataset)
-    if found is None:
-        return {}
-    axis, towards, angle = found
-    name = f"angle of {axis} from {towards}".replace(" ", "_")
-    return {name: xarray.DataArray(angle, dims="time", attrs={"units": "rad"})}
+    return Picture("satellite on its orbit", stages, notes)
 
 
 def _is_far(path: Array, planet: _Planet) -> bool:
@@ -170,9 +156,9 @@ def _in_local_frame(
     assert attitude is not None
     relative = np.einsum("tji,tjk->tik", local, attitude)
     # the principal axis that points to the planet on average, or nearest to that
-    along = signals.principal_axes(dataset) @ np.nanmean(relative[:, 2, :], axis=0)
+    along = scene_of(dataset).axes @ np.nanmean(relative[:, 2, :], axis=0)
     k = int(np.abs(along).argmax())
-    axis = signals.principal_axes(dataset)[k] * (1.0 if along[k] >= 0 else -1.0)
+    axis = scene_of(dataset).axes[k] * (1.0 if along[k] >= 0 else -1.0)
     # in space, as all moving parts are; the view looks from the local frame
     tip = 1.3 * np.einsum("tij,tj->ti", relative, np.broadcast_to(axis, (len(relative), 3)))
     name = f"to {called(planet, 'source')}"
@@ -207,13 +193,13 @@ def _in_local_frame(
 
 def flight(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     """Picture of a body with a position under a uniform gravity and without attractor; None for others."""
-    pull, position = surroundings.gravity(dataset), subject.position
-    if pull is None or position is None or surroundings.told(dataset, "attractor"):
+    pull, position = scene_of(dataset).gravity, subject.position
+    if pull is None or position is None or scene_of(dataset).attractors:
         return None
     arrows, trails, notes = vectors_of(dataset, subject, paths=False)
     *others, path = bodies.with_track(subject, subject.stage(arrows, trails), notes)
     assert path.translation is not None
-    up = surroundings.vertical(dataset)
+    up = scene_of(dataset).vertical
     points = signals.finite_rows(path.translation)
     heights = points @ up
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
@@ -241,8 +227,7 @@ def flight(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
         camera=Camera(center + 0.82 * extent / np.sin(FIELD / 2) * direction, center, up),
         axis_length=0.0,
     )
-    leading = ("position", "angular_velocity", "tilt")
-    return Picture("flight in a uniform gravity", [stage, *others], [], leading, notes)
+    return Picture("flight in a uniform gravity", [stage, *others], notes)
 
 
 def _level_axes(points: Array, up: Array) -> tuple[Array, Array]:

@@ -12,6 +12,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from rigidsim.look.plots import Plot
 from rigidsim.look.signals import across, finite_rows, joined, norms, seconds, values
 from rigidsim.look.solids import Array, Color, Mesh
 from rigidsim.look.thinning import thinned_indices
@@ -214,33 +215,15 @@ class Stage:
 
 
 @dataclass(frozen=True)
-class Plane:
-    """A plane figure: a path (rows, 2) whose point moves along time, or points that stand for themselves;
-    with labelled rings about the origin, and names of both axes. The title has the unit.
-    """
-
-    key: str
-    title: str
-    color: Color
-    points: Array
-    moves: bool = True
-    rings: tuple[tuple[float, str], ...] = ()
-    names: tuple[str, str] = ("", "")
-
-
-@dataclass(frozen=True)
 class Picture:
-    """Everything drawn of a dataset besides its plots: the kind of scene in words, the body's stage first,
-    plane figures beside it, the variables whose plots come first, notes on scales for a page, and variables
-    that were worked out for plots.
+    """Everything in three dimensions that is drawn of a dataset: the kind of scene in words, the body's stage
+    first, notes on scales for a page, and plots that tell of what is on the stage alone.
     """
 
     kind: str
     stages: list[Stage]
-    planes: list[Plane] = field(default_factory=list)
-    leading: tuple[str, ...] = ()
     notes: list[str] = field(default_factory=list)
-    derived: dict[str, xarray.DataArray] = field(default_factory=dict)
+    plots: list[Plot] = field(default_factory=list)
 
 
 def _stride_of(points: Array, share: float) -> int:

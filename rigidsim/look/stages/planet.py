@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import xarray
 
-from rigidsim.look import signals, surroundings
+from rigidsim.look import signals
+from rigidsim.look.record import color_of, named_body, scene_of
 from rigidsim.look.stages import parts, precession
-from rigidsim.look.stages.bodies import Subject, column, source_arrows
-from rigidsim.look.stages.facing import angles, facing
+from rigidsim.look.stages.bodies import Subject, source_arrows
+from rigidsim.look.stages.facing import facing
 from rigidsim.look.stages.parts import (
     BODY,
     Array,
@@ -19,7 +20,6 @@ from rigidsim.look.stages.parts import (
     Color,
     Line,
     Picture,
-    Plane,
     Solid,
     Stage,
     Trail,
@@ -37,14 +37,12 @@ _X_AXIS_WEST = {"earth_rigid": 14.93}  # deg from Greenwich, of presets whose x 
 _SUN, _MOON = 0.11, 0.07  # radii of the balls that stand for sources, in radii of the globe
 _AWAY = 0.2  # of an arrow's length, by which its label stands beyond the ball
 _OPPOSITE = 1e-6
-_CIRCLING = "Figure axis in space"
-_LEADING = ("polar_motion", "obliquity", "node_longitude", "wobble_angle", "rotation_angle")
 
 
 def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     """Picture of a large, nearly round body that spins nearly about its figure axis; None for others."""
     axes = _semi_axes(subject)
-    poles = _about_figure_axis(dataset) or "obliquity" in dataset or "polar_motion" in dataset
+    poles = signals.near_axis(dataset, exactly=True) or "obliquity" in dataset or "polar_motion" in dataset
     if axes is None or subject.position is not None or not poles:
         return None
     preset = str(subject.solids[0].get("name", ""))
@@ -53,8 +51,8 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     name = name or (known.name.lower() if known else "")
     half, west = axes / axes.max(), _X_AXIS_WEST.get(preset, 0.0)
     mapped = name in ("earth", "moon")
-    mesh = pictured_globe(half, name) if mapped else globe(half, surroundings.color_of(known, _UNKNOWN))
-    figure = signals.figure_direction(dataset)
+    mesh = pictured_globe(half, name) if mapped else globe(half, color_of(known, _UNKNOWN))
+    figure = scene_of(dataset).figure
     turns, averaged = subject.attitude is not None, "angular_velocity" not in dataset
     if not turns and averaged:
         subject = precession.pointed(dataset, subject, figure)
@@ -67,30 +65,16 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     stage.lines.extend(lines)
     zero = f"{west:.4g}° west of Greenwich" if west else "at longitude zero"
     notes = [f"continents: Natural Earth; the body's x axis is {zero}"] if name == "earth" else []
-    planes = _pole_planes(dataset)
     face = facing(dataset, subject, figure)
-    faces, derived = [], {}
+    faces = []
     if face is not None:
-        faces, derived = [replace(face.stage, lines=[*lines, *face.stage.lines])], face.derived
-        planes = [*([face.plane] if face.plane else []), *planes]
-        notes.append(face.note)
-    motion = signals.polar_motion(dataset)
-    circling = _about_momentum(dataset, figure)
-    if circling is not None:
-        planes.insert(0, precession.plane_of("circling", _CIRCLING, parts.FIGURE, circling, ("across", "")))
-        derived = {"figure_axis_about_momentum": angles(dataset, circling, ("across", "across, 90° on"))}
-    elif (
-        motion is not None and not {"polar_motion", "obliquity"} & set(dataset) and np.nanmax(abs(motion)) > 0
-    ):
-        derived = {**derived, "polar_motion": angles(dataset, motion, ("m1", "m2"))}
-    leading = (*(name for name in derived if name != "polar_motion"), *_LEADING)
-    if face is not None and face.derived:
-        leading = (*face.derived, *(name for name in _LEADING if name != "polar_motion"))
+        faces = [replace(face[0], lines=[*lines, *face[0].lines])]
+        notes.append(face[1])
     called = {"": "a planet", "earth": "the Earth", "moon": "the Moon"}.get(name, name.capitalize())
     if subject.attitude is None:
         _in_its_own_axes(dataset, stage, figure, notes)
         stage = replace(stage, camera=precession.eye_of_pole(0.3, 1.75))
-        return Picture(f"rotation of {called}", [*faces, stage], planes, leading, notes, derived)
+        return Picture(f"rotation of {called}", [*faces, stage], notes)
     pole = subject.attitude @ figure
     arrow = Arrow(
         "figure_axis", "figure axis", parts.FIGURE, precession.POLE_REACH * pole, False, "figure axis"
@@ -99,27 +83,27 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     stage = precession.on_reference_plane(dataset, stage)
     precession.circle_of_precession(dataset, stage, pole, "figure", notes)
     if turns:
-        arrows = source_arrows(dataset, subject, precession.SOURCE_REACH)
+        arrows = source_arrows(dataset, precession.SOURCE_REACH)
         stage.arrows.extend(arrows)
         stage = _with_balls(stage, arrows)
-        if len(arrows) < len(surroundings.told(dataset, "source")) and "source_position" in dataset:
+        if len(arrows) < len(scene_of(dataset).sources) and "source_position" in dataset:
             notes.append(
                 "directions are shown of sources whose tide is a thousandth of the strongest or more"
             )
     elif beside:
         notes.append("the plane of reference moves in space: the globe is drawn as seen from it")
     else:
-        stage.arrows.extend(precession.followed_sources(dataset, subject, notes))
+        stage.arrows.extend(precession.followed_sources(dataset, notes))
     if not turns:
         notes.append(precession.standing_note(dataset, "globe"))
-    rates, seconds = column(dataset, "angular_velocity", 3), signals.seconds(dataset)
+    rates, seconds = signals.values(dataset, "angular_velocity", 3), signals.seconds(dataset)
     if rates is not None and len(seconds) > 1:
         step = float(np.nanmean(np.linalg.norm(rates, axis=1)) * np.abs(np.diff(seconds)).mean())
         if step > 1.0:
             words = "the globe's turning isn't seen between them"
             notes.append(f"samples are {step:.3g} rad of rotation apart: {words}")
     stage = replace(stage, camera=precession.eye_of_pole())
-    return Picture(f"rotation of {called} in space", [*faces, stage], planes, leading, notes, derived)
+    return Picture(f"rotation of {called} in space", [*faces, stage], notes)
 
 
 def _with_balls(stage: Stage, arrows: list[Arrow]) -> Stage:
@@ -160,26 +144,10 @@ def _turn(degrees: float) -> Array:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _about_momentum(dataset: xarray.Dataset, figure: Array) -> Array | None:
-    """The figure axis across a momentum that stays put (rows, 2), rad, if samples follow it; else None."""
-    momentum, pole = signals.steady_momentum(dataset), signals.body_direction(dataset, figure)
-    if momentum is None or pole is None or not np.isfinite(pole).all():
-        return None
-    path = pole @ np.stack(signals.across(momentum), axis=1)
-    size = float(np.abs(path).max())
-    return path if 0 < size < signals.NEAR_AXIS and signals.joined(path) else None
-
-
-def _about_figure_axis(dataset: xarray.Dataset) -> bool:
-    """Whether the body spins about its figure axis, exactly or nearly."""
-    motion = signals.polar_motion(dataset)
-    return motion is not None and bool(np.nanmax(signals.norms(motion)) < signals.NEAR_AXIS)
-
-
 def _known(name: str, radius: float) -> KnownBody | None:
     """The known planet with this name, or else with this equatorial radius (m); None if unknown."""
     if name:
-        return surroundings.named_body(name)
+        return named_body(name)
     near = min(KNOWN, key=lambda one: abs(one.radius - radius))
     return near if abs(near.radius / radius - 1) < _ALIKE else None
 
@@ -201,7 +169,7 @@ def _in_its_own_axes(dataset: xarray.Dataset, stage: Stage, figure: Array, notes
     stage.vectors.append(
         Vector("figure_axis", "figure axis", parts.FIGURE, figure, 0.55 * figure, BODY, "figure axis", 0.014)
     )
-    rates = column(dataset, "angular_velocity", 3)
+    rates = signals.values(dataset, "angular_velocity", 3)
     if rates is None:
         return
     spin = rates / np.linalg.norm(rates, axis=1, keepdims=True)
@@ -221,14 +189,3 @@ def _in_its_own_axes(dataset: xarray.Dataset, stage: Stage, figure: Array, notes
         Trail("polar_motion", parts.POLHODE, shown, in_body=True, words="path of the spin axis")
     )
     notes.append(f"the angle between spin axis and figure axis is drawn {times} too large")
-
-
-def _pole_planes(dataset: xarray.Dataset) -> list[Plane]:
-    """Polar motion in the body, and the pole in space less its mean motion."""
-    planes = precession.nutation_planes(dataset, "figure")
-    motion = signals.polar_motion(dataset)
-    if motion is not None and np.nanmax(np.abs(motion)) > 0:
-        planes.append(
-            precession.plane_of("polar_motion_path", "Polar motion", parts.POLHODE, motion, ("m1", "m2"))
-        )
-    return planes

@@ -9,14 +9,15 @@ from dataclasses import replace
 import numpy as np
 import xarray
 
-from rigidsim.look import signals, surroundings
+from rigidsim.look import signals
 from rigidsim.look.fits import secular
+from rigidsim.look.record import scene_of
 from rigidsim.look.signals import is_averaged
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import Subject, direction_of, eye_at, source_arrows
-from rigidsim.look.stages.parts import SPACE, Array, Arrow, Camera, Color, Line, Picture, Plane, Spot, Stage
+from rigidsim.look.stages.parts import SPACE, Array, Arrow, Camera, Color, Line, Picture, Spot, Stage
 from rigidsim.look.symbols import graticule
-from rigidsim.scene.readable import DAY, YEAR, angle_unit, span_text
+from rigidsim.scene.readable import DAY, YEAR, span_text
 from rigidsim.scene.rotations import quaternion_of
 
 ECLIPTIC: Color = (226, 196, 90)
@@ -45,7 +46,7 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     if len(axes) == 2 and np.linalg.norm(axes["figure"] - axes["momentum"], axis=1).max() < _APART:
         del axes["momentum"]
     notes: list[str] = []
-    subject = pointed(dataset, subject, signals.figure_direction(dataset))
+    subject = pointed(dataset, subject, scene_of(dataset).figure)
     stage = replace(subject.stage([], [], "Axes in space"), axis_length=0.0, camera=eye_of_pole())
     if leading == "figure":
         notes.append(standing_note(dataset, "body"))
@@ -64,10 +65,8 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
             stage.trails.append(path)
     stage = on_reference_plane(dataset, stage)
     circle_of_precession(dataset, stage, axes[leading], leading, notes)
-    stage.arrows.extend(followed_sources(dataset, subject, notes))
-    planes = nutation_planes(dataset, leading)
-    variables = ("obliquity", "node_longitude", "momentum_axis", "figure_axis")
-    return Picture("axes in space", [stage], planes, variables, notes)
+    stage.arrows.extend(followed_sources(dataset, notes))
+    return Picture("axes in space", [stage], notes)
 
 
 def eye_of_pole(height: float = 0.05, radius: float = 1.95) -> Camera:
@@ -127,14 +126,14 @@ def standing_note(dataset: xarray.Dataset, what: str) -> str:
     return f"{why}: the {what} points where its figure axis does, and doesn't turn about it"
 
 
-def followed_sources(dataset: xarray.Dataset, subject: Subject, notes: list[str]) -> list[Arrow]:
+def followed_sources(dataset: xarray.Dataset, notes: list[str]) -> list[Arrow]:
     """Directions of sources that advance little enough from row to row for the eye to follow."""
     seconds = signals.seconds(dataset)
     step = float(np.abs(np.diff(seconds)).mean()) if len(seconds) > 1 else 0.0
-    orbits = [one.get("orbit", {}) for one in surroundings.told(dataset, "source")]
+    orbits = [one.get("orbit", {}) for one in scene_of(dataset).sources]
     rates = {f"source{k}": float(orbit.get("mean_motion", 0.0)) for k, orbit in enumerate(orbits)}
     kept = []
-    for arrow in source_arrows(dataset, subject, SOURCE_REACH):
+    for arrow in source_arrows(dataset, SOURCE_REACH):
         if abs(rates.get(arrow.name, 0.0)) * step > _SPARSE:
             notes.append(f"the {arrow.words} isn't shown: samples are too far apart to follow it")
         else:
@@ -192,36 +191,9 @@ def circle_of_precession(
 def _whole_revolution(dataset: xarray.Dataset, span: float) -> bool:
     """Whether a run is as long as a revolution of each source: of less, what a line fits is nutation too."""
     known = {"sun": YEAR, "moon": _MONTH}
-    for one in surroundings.told(dataset, "source"):
+    for one in scene_of(dataset).sources:
         rate = (one.get("orbit") or {}).get("mean_motion")
         period = 2 * np.pi / abs(rate) if rate else known.get(str(one.get("ephemeris", "")).lower(), 0.0)
         if span < _ALMOST_WHOLE * period:
             return False
     return True
-
-
-def nutation_planes(dataset: xarray.Dataset, axis: str) -> list[Plane]:
-    """The axis named figure or momentum less its mean motion, if the momentum moves: one plane, or none."""
-    momentum = signals.steady_momentum(dataset) if "quaternion" in dataset else None
-    found = signals.orientation(dataset, axis) if momentum is None else None
-    if found is None or not np.isfinite(found).all() or len(found[0]) <= 8:
-        return []
-    seconds = signals.seconds(dataset)
-    tilt, node = (x - secular(seconds, x).at(seconds) for x in found)
-    path = np.stack([node * np.sin(np.mean(found[0])), tilt], axis=1)
-    if not np.abs(path).max() > 0:
-        return []
-    title = "Nutation of the pole" if axis == "figure" else f"Nutation of the {axis}"
-    return [plane_of("nutation_path", title, parts.FIGURE, path, ("longitude", "obliquity"))]
-
-
-def plane_of(key: str, title: str, color: Color, path: Array, names: tuple[str, str]) -> Plane:
-    """A plane of small angles (rows, 2), rad, in the unit that suits them, with rings about the origin."""
-    size = float(np.nanmax(np.linalg.norm(path, axis=1)))
-    unit = angle_unit(size)
-    shown = path * unit.per_radian
-    reach = size * unit.per_radian
-    power = 10.0 ** np.floor(np.log10(reach))
-    step = next(s for s in (5, 2, 1, 0.5) if s * power <= 0.75 * reach) * power
-    rings = tuple((k * step, f"{k * step:.3g} {unit.symbol}") for k in (1, 2) if k * step < 1.3 * reach)
-    return Plane(key, f"{title} [{unit.symbol}]", color, shown, rings=rings, names=names)

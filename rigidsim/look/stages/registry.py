@@ -11,21 +11,21 @@ import numpy as np
 import xarray
 
 from rigidsim.look import signals
+from rigidsim.look.record import scene_of
 from rigidsim.look.stages import orbits, parts, planet, precession, top
-from rigidsim.look.stages.bodies import Subject, column, source_arrows, vectors_of, with_track
+from rigidsim.look.stages.bodies import Subject, source_arrows, vectors_of, with_track
 from rigidsim.look.stages.parts import BODY, Array, Arrow, Camera, Line, Picture, Shell, Spot, Stage, Vector
 from rigidsim.look.stages.uncertainty import with_cone
 from rigidsim.look.stages.wheels import with_wheels
-from rigidsim.look.surroundings import carries_within
 from rigidsim.scene.rotations import quaternion_of
 
 ENERGY: tuple[int, int, int] = (120, 150, 200)
-_LEADING = ("angular_velocity", "polar_motion", "nutation_angle")
 
 
 def free(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     """Picture of a body whose energy and momentum are constant; None for others."""
-    constants, rates = signals.energy_and_momentum(dataset), column(dataset, "angular_velocity", 3)
+    constants = signals.energy_and_momentum(dataset)
+    rates = signals.values(dataset, "angular_velocity", 3)
     if constants is None or rates is None or subject.position is not None:
         return None
     moments, twice, _ = constants
@@ -36,11 +36,11 @@ def free(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     if subject.attitude is None:
         notes.append("no attitude was recorded: the body is shown in its own axes and doesn't turn")
         stage.shells.append(_shell(dataset, 1.6 * radii / float(np.linalg.norm(rates, axis=1).max())))
-        return Picture("free rotation", stages, [], _LEADING, notes)
+        return Picture("free rotation", stages, notes)
     # the principal axis nearest to the first angular velocity
-    along = signals.principal_axes(dataset) @ rates[0]
+    along = scene_of(dataset).axes @ rates[0]
     k = int(np.abs(along).argmax())
-    followed = signals.principal_axes(dataset)[k] * (1 if along[k] >= 0 else -1)
+    followed = scene_of(dataset).axes[k] * (1 if along[k] >= 0 else -1)
     tip = np.einsum("tij,j->ti", subject.attitude, 1.15 * followed)
     words = f"trace of the body's {_axis_name(followed)} axis"
     trace = parts.Trail("axis_trace", parts.FIGURE, tip, with_centre=True, words=words)
@@ -53,12 +53,12 @@ def free(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
             "Poinsot's construction: the ellipsoid of energy (blue), which turns with the body, rolls on the "
             "invariable plane; the point of contact is the tip of ω"
         )
-    return Picture("free rotation", stages, [], _LEADING, notes)
+    return Picture("free rotation", stages, notes)
 
 
 def _shell(dataset: xarray.Dataset, radii: Array) -> Shell:
     # principal axes are rows: the rotation from these to body axes is the transpose
-    turn = quaternion_of(signals.principal_axes(dataset).T[None])[0]
+    turn = quaternion_of(scene_of(dataset).axes.T[None])[0]
     return Shell("energy_ellipsoid", radii, ENERGY, BODY, turn[[1, 2, 3, 0]])
 
 
@@ -133,10 +133,10 @@ def build_picture(dataset: xarray.Dataset) -> tuple[Picture, Subject]:
 
 def _any(dataset: xarray.Dataset, subject: Subject) -> Picture:
     """Any scene: the body with its momentum and angular velocity, and its track if it moves far."""
-    arrows, trails, notes = vectors_of(dataset, subject, paths=not carries_within(dataset))
+    arrows, trails, notes = vectors_of(dataset, subject, paths=not scene_of(dataset).carries_within)
     if subject.attitude is None:
         notes.append("no attitude was recorded: the body is shown in its own axes and doesn't turn")
     else:
-        arrows += source_arrows(dataset, subject, 0.95 * parts.ARROW_REACH)
+        arrows += source_arrows(dataset, 0.95 * parts.ARROW_REACH)
     stages = with_track(subject, subject.stage(arrows, trails), notes)
-    return Picture("motion of a rigid body", stages, [], ("angular_velocity",), notes)
+    return Picture("motion of a rigid body", stages, notes)

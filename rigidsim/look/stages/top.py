@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import xarray
 
-from rigidsim.look import signals, surroundings
+from rigidsim.look import signals
+from rigidsim.look.record import scene_of
 from rigidsim.look.solids import Mesh
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import FIELD, Subject, vectors_of
-from rigidsim.look.stages.parts import BODY, SPACE, Array, Camera, Line, Picture, Plane, Spot, Trail, Vector
+from rigidsim.look.stages.parts import BODY, SPACE, Array, Camera, Line, Picture, Spot, Trail, Vector
 from rigidsim.look.symbols import spinning_top
 
 TRACE = 1.0  # where on the axis the traced point is, in reaches
@@ -21,7 +22,7 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     arm = signals.lever(dataset)
     if arm is None or subject.quaternion is None:
         return None
-    up = surroundings.vertical(dataset)
+    up = scene_of(dataset).vertical
     axis = _figure(dataset, arm)
     symbol = _symbol(dataset, subject, arm, axis)
     if symbol is not None:
@@ -66,15 +67,14 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
         vectors=[Vector("gravity", words, parts.PULL, place, -0.55 * up, SPACE, words, 0.02)],
         camera=Camera(target + radius / np.sin(FIELD / 2) * direction, target, up),
     )
-    leading = ("tilt", "precession_angle", "nutation_angle", "euler_angles")
-    return Picture("top on a fixed point", [stage], [_from_above(tip, up, across)], leading, notes)
+    return Picture("top on a fixed point", [stage], notes)
 
 
 def _figure(dataset: xarray.Dataset, arm: Array) -> Array:
     """The axis whose trace is shown: of symmetry if the centre of mass lies on it, else through that."""
-    moments = signals.moments(dataset)
-    if moments is not None:
-        axis = signals.principal_axes(dataset)[signals.figure_index(moments)]
+    scene = scene_of(dataset)
+    if scene.moments is not None:
+        axis = scene.axes[scene.symmetry]
         along = float(axis @ arm) / float(np.linalg.norm(arm))
         if abs(along) > 1 - _SYMMETRIC:
             return np.asarray(np.sign(along) * axis)
@@ -83,19 +83,18 @@ def _figure(dataset: xarray.Dataset, arm: Array) -> Array:
 
 def _symbol(dataset: xarray.Dataset, subject: Subject, arm: Array, axis: Array) -> tuple[Mesh, float] | None:
     """A toy top (in metres) and its reach, if only the moments of a symmetric body are known; else None."""
-    moments = signals.moments(dataset)
-    mass = dataset.attrs.get("mass")
+    scene = scene_of(dataset)
     only = len(subject.solids) == 1 and subject.solids[0].get("equivalent")
-    if not only or moments is None or mass is None:
+    if not only or scene.moments is None or scene.mass is None:
         return None
-    k = signals.figure_index(moments)
-    a, b = moments[(k + 1) % 3], moments[(k + 2) % 3]
-    along = abs(float(signals.principal_axes(dataset)[k] @ arm)) / float(np.linalg.norm(arm))
+    moments, k = scene.moments, scene.symmetry
+    a, b = np.delete(moments, k)
+    along = abs(float(scene.axes[k] @ arm)) / float(np.linalg.norm(arm))
     if abs(a - b) > _SYMMETRIC * max(a, b) or along < 1 - _SYMMETRIC:
         return None
     length = float(np.linalg.norm(arm))
     # of a disk, C = m r^2/2; kept to what still looks like a top
-    radius = float(np.clip(np.sqrt(2 * moments[k] / float(mass)), 0.35 * length, 1.3 * length))
+    radius = float(np.clip(np.sqrt(2 * moments[k] / scene.mass), 0.35 * length, 1.3 * length))
     mesh = spinning_top(radius, length, 1.75 * length)
     other = _across(axis)
     return mesh.moved(np.stack([*other, axis], axis=1), np.zeros(3)), 1.75 * length
@@ -121,12 +120,3 @@ def _ground(up: Array, at: Array) -> list[Line]:
         points = np.stack([at - 1.6 * way, at + 1.6 * way])
         lines.append(Line(f"ground/spoke{k}", parts.FAINT, points, SPACE, 0.7, 0.4))
     return lines
-
-
-def _from_above(tip: Array, up: Array, across: tuple[Array, Array]) -> Plane:
-    plane = tip @ np.stack(across, axis=1)
-    # its tilt, not its height, is what rings can tell
-    rings = tuple((float(np.sin(np.deg2rad(t))), f"{t}°") for t in (10, 30, 60, 90))
-    largest = float(np.nanmax(np.linalg.norm(plane, axis=1)))
-    shown = tuple(ring for ring in rings if ring[0] <= 1.3 * largest) or rings[:1]
-    return Plane("tip_from_above", "Axis from above", parts.FIGURE, plane, rings=shown, names=("X", "Y"))

@@ -13,6 +13,8 @@ import numpy as np
 import xarray
 
 from rigidsim.look import signals
+from rigidsim.look.curves import plotted
+from rigidsim.look.record import scene_of
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import Subject
 from rigidsim.look.stages.parts import Array, Cone, Picture, Stage
@@ -29,7 +31,6 @@ _WIDENED, _NARROWED = np.deg2rad(25.0), np.deg2rad(50.0)  # the largest (rad) th
 _STEPS = (1, 2, 3, 5, 10)
 _SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 _TO_SCALE = 0.5  # reaches: a body drawn smaller is a mark on its orbit
-_ABOUT = "uncertainty_about_figure_axis"
 _LEADING = "figure_axis_uncertainty"
 
 
@@ -86,7 +87,7 @@ def with_cone(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Pi
     covariance = signals.values(dataset, COVARIANCE)
     if covariance is None or subject.attitude is None:
         return picture
-    found = AxisUncertainty.of(signals.figure_direction(dataset), subject.attitude, covariance)
+    found = AxisUncertainty.of(scene_of(dataset).figure, subject.attitude, covariance)
     angles = found.half_angles
     largest = float(np.nanmax(angles, initial=0.0))
     if not largest > _ROUNDING * float(np.nanmax(found.about, initial=0.0)):
@@ -105,20 +106,17 @@ def with_cone(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Pi
     ]
     if not np.isfinite(angles).all():
         notes.append("where there is no cone, an undetermined parameter would move the axis without bounds")
-    derived = {
-        _LEADING: _variable(dataset, angles, ("widest", "narrowest"), "1 sigma of the figure axis"),
-        _ABOUT: _variable(dataset, found.about[:, None], ("about it",), "1 sigma of the rotation about it"),
-    }
-    first, *rest = picture.leading or ("",)
+    table, title = np.column_stack([angles, found.about]), "1 sigma of the figure axis"
+    labels = ("widest", "narrowest", "about it")
+    plot = replace(plotted(dataset, _LEADING, title, table, labels=labels, word="1 sigma"), error=None)
     return replace(
         picture,
         stages=[
             replace(one, cones=[short if one.flat else cone]) if _to_scale(one) else one
             for one in picture.stages
         ],
-        leading=(first, _LEADING, *rest),
         notes=[*picture.notes, *notes],
-        derived={**picture.derived, **derived},
+        plots=[*picture.plots, plot],
     )
 
 
@@ -151,9 +149,3 @@ def _to_scale(stage: Stage) -> bool:
     """Whether a body that turns is drawn at its own size on a stage."""
     turns = stage.quaternion is not None or bool(stage.turns_with)
     return turns and max((mesh.reach() for mesh in stage.meshes), default=0.0) > _TO_SCALE
-
-
-def _variable(dataset: xarray.Dataset, table: Array, names: tuple[str, ...], words: str) -> xarray.DataArray:
-    across = f"of_{'_'.join(names).replace(' ', '_')}"
-    coordinates = {"time": dataset["time"], across: list(names)}
-    return xarray.DataArray(table, coordinates, ("time", across), attrs={"units": "rad", "long_name": words})

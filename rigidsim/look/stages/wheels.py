@@ -13,9 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray
 
-from rigidsim.look import gyrostats, signals, surroundings
+from rigidsim.look import gyrostats, signals
 from rigidsim.look.gyrostats import RecordedRotor
+from rigidsim.look.record import scene_of
 from rigidsim.look.solids import Mesh, solid_mesh
+from rigidsim.look.sources import integrated
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import Subject
 from rigidsim.look.stages.parts import BODY, Array, Arrow, Color, Line, Picture, Solid, Spot, Stage, Trail
@@ -28,7 +30,6 @@ _FLATNESS, _GAP = 0.3, 0.06  # of a disc's radius: its thickness; of the body's 
 _SMALLEST, _USUAL = 0.12, 0.3  # radii over the body's reach
 _PICTURES = 30.0  # a second on the screen that are surely drawn
 _TOO_FAST, _SLOWED = 1 / 3, 1 / 12  # turns from one picture to the next: from which on, and then
-_LEADING = "rotor_rate"
 
 
 @dataclass(frozen=True)
@@ -60,9 +61,9 @@ def with_wheels(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> 
     """The picture with the dataset's rotors on its body, if it has some and the body is drawn to scale."""
     found = gyrostats.rotors(dataset)
     drawn = {rotor.name for rotor in found}
-    missing = [one["name"] for one in surroundings.told(dataset, "rotor") if one["name"] not in drawn]
+    missing = [one["name"] for one in scene_of(dataset).rotors if one["name"] not in drawn]
     if missing:
-        unseen = f"not drawn, since {_LEADING} isn't recorded: rotor {', '.join(missing)}"
+        unseen = f"not drawn, since rotor_rate isn't recorded: rotor {', '.join(missing)}"
         picture = replace(picture, notes=[*picture.notes, unseen])
     to_scale = [stage for stage in picture.stages if stage.unit == subject.reach and stage.meshes]
     if not found or not to_scale:
@@ -91,11 +92,8 @@ def with_wheels(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> 
         arrows=[*stage.arrows, *arrows],
         trails=[*stage.trails, *trails],
     )
-    vary = any(rotor.varies for rotor in found)
-    first, *rest = picture.leading or ("",)
-    leading = (first, _LEADING, *rest) if vary else picture.leading
     stages = [changed if one is stage else one for one in picture.stages]
-    return replace(picture, stages=stages, leading=leading, notes=[*picture.notes, *notes, *told])
+    return replace(picture, stages=stages, notes=[*picture.notes, *notes, *told])
 
 
 def _slowing(dataset: xarray.Dataset, rotor: RecordedRotor) -> float:
@@ -115,8 +113,7 @@ def _slowing(dataset: xarray.Dataset, rotor: RecordedRotor) -> float:
 
 def _turning(dataset: xarray.Dataset, rotor: RecordedRotor, slower: float) -> Array:
     """Quaternions (rows, 4) w x y z by which it has turned in the body."""
-    rate, steps = np.nan_to_num(rotor.rate) / slower, np.diff(signals.seconds(dataset))
-    angle = np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2 * steps))
+    angle = integrated(signals.seconds(dataset), np.nan_to_num(rotor.rate) / slower)
     return np.column_stack([np.cos(angle / 2), np.sin(angle / 2)[:, None] * rotor.axis])
 
 

@@ -1,16 +1,16 @@
 """The page that the viewer opens with: scene, legend, plots, and summary; of several runs side by side."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint.components import LinkAxis
 
+from rigidsim.look.paths import Path
 from rigidsim.look.plots import Plot
 from rigidsim.look.stages.bodies import camera
-from rigidsim.look.stages.parts import Color, Plane, Stage
+from rigidsim.look.stages.parts import Color, Stage
 from rigidsim.look.timeline import plotting
 from rigidsim.look.timeline.drawing import OLDER, trail_path
 from rigidsim.look.timeline.drawn import Clock, DrawnRun
@@ -30,7 +30,7 @@ def build_blueprint(run: DrawnRun, *, following: bool = False, part: str | None 
     """The layout for a run, which opens at its start and plays, or stays at the end of one that goes on; of a
     picture one of ``PARTS``, without the viewer's own bars; or ``PLAYER``.
     """
-    stages, planes, clock = run.picture.stages, run.planes, run.clock
+    stages, planes, clock = run.picture.stages, run.paths, run.clock
     narrow, facing = len(stages) > 1, stages[0].flat
     titled = part is None or narrow
     spaces: list[rrb.View | rrb.Container]
@@ -45,7 +45,7 @@ def build_blueprint(run: DrawnRun, *, following: bool = False, part: str | None 
     height = PIXELS / 2 if part == PLAYER else PIXELS
     left = left_side(scene, plotting.legend_of(stages), pages, height)
     views = {
-        place: [plot_view(plot, clock) for plot in run.plots if plot.place == place]
+        place: [plot_view([plot], clock) for plot in run.plots if plot.place == place]
         for place in ("leading", "drift", "more")
     }
     right: list[rrb.View | rrb.Container] = [*views["leading"]]
@@ -98,18 +98,16 @@ def build_comparison(
         if len(eyes) <= 3
         else rrb.Vertical(rrb.Horizontal(*eyes[:half]), rrb.Horizontal(*eyes[half:]))
     )
-    common: dict[str, Plot] = {}
+    common: dict[str, list[Plot]] = {}
     for plot in (plot for run in runs for plot in run.plots):
-        found = common.get(plot.key)
-        series, levels = (found.series, found.levels) if found else ([], [])
-        common[plot.key] = replace(
-            found or plot, series=[*series, *plot.series], levels=[*levels, *plot.levels]
-        )
-    views = [] if difference is None else [plot_view(difference, clock)]
-    views += [plot_view(plot, clock) for plot in common.values() if plot.place == "leading"][: 4 - len(views)]
-    for plot in (plot for plot in common.values() if plot.place == "drift"):
-        curves = sum(len(one.labels) for one in plot.series) + len(plot.levels)
-        views.append(plot_view(plot, clock, named=curves <= _CURVES))  # leading plots tell the colours, too
+        common.setdefault(plot.heading, []).append(plot)
+    views = [] if difference is None else [plot_view([difference], clock)]
+    views += [plot_view(found, clock) for found in common.values() if found[0].place == "leading"][
+        : 4 - len(views)
+    ]
+    for found in (found for found in common.values() if found[0].place == "drift"):
+        curves = sum(len(plot.labels) + len(plot.levels) for plot in found)
+        views.append(plot_view(found, clock, named=curves <= _CURVES))  # leading plots tell the colours, too
     left = left_side(
         scene,
         plotting.legend_of([stage for run in runs for stage in run.picture.stages]),
@@ -223,37 +221,35 @@ def _window(clock: Clock, rows: int) -> list[rr.VisibleTimeRange]:
     ]
 
 
-def plane_view(plane: Plane) -> rrb.Spatial2DView:
+def plane_view(plane: Path) -> rrb.Spatial2DView:
     """A view of one plane figure."""
-    size = 1.35 * plotting.plane_reach(plane)
+    size = 1.35 * plane.reach
     return rrb.Spatial2DView(
-        origin=f"/planes/{plane.key}",
+        origin=f"/planes/{plane.name}",
         name=plane.title,
         background=_DARK,
         visual_bounds=rrb.VisualBounds2D(x_range=(-size, size), y_range=(-size, size)),
     )
 
 
-def plot_view(plot: Plot, clock: Clock, *, named: bool = True) -> rrb.TimeSeriesView:
-    """A view of one plot, with the names of its curves or without."""
+def plot_view(plots: Sequence[Plot], clock: Clock, *, named: bool = True) -> rrb.TimeSeriesView:
+    """A view of a plot, or of those of several runs, with the names of its curves or without."""
     # Independent axes of infinite range: a long run opens whole.
+    first, lines = plots[0], sum(len(plot.labels) + len(plot.levels) for plot in plots)
     shown = rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
-    if plot.window:
-        reach = round(plot.window / 2 * _ticks_per_row(clock))
+    if first.window:
+        reach = round(first.window / 2 * _ticks_per_row(clock))
         shown = rr.TimeRange(
             start=rr.TimeRangeBoundary.cursor_relative(seq=-reach),
             end=rr.TimeRangeBoundary.cursor_relative(seq=reach),
         )
     # Drifts grow upwards along time: their legend stays below, out of the way.
-    corner = rrb.Corner2D.RightBottom if plot.place == "drift" else rrb.Corner2D.LeftTop
+    corner = rrb.Corner2D.RightBottom if first.place == "drift" else rrb.Corner2D.LeftTop
     return rrb.TimeSeriesView(
         origin="/plots",
-        contents=[
-            *(plotting.plot_path(plot, series.name) for series in plot.series),
-            *(plotting.plot_path(plot, level.key) for level in plot.levels),
-        ],
-        name=plot.title,
-        plot_legend=rrb.PlotLegend(visible=named, corner=corner),
-        axis_y=None if plot.range is None else rrb.ScalarAxis(range=plot.range),
+        contents=[f"{plotting.plot_path(plot)}/**" for plot in plots],
+        name=first.heading,
+        plot_legend=rrb.PlotLegend(visible=named and lines > 1, corner=corner),
+        axis_y=None if first.steady is None else rrb.ScalarAxis(range=first.steady),
         axis_x=rrb.TimeAxis(link=LinkAxis.Independent, view_range=shown),
     )

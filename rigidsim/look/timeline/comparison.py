@@ -10,9 +10,9 @@ import numpy as np
 import xarray
 
 from rigidsim.look.page import legible
-from rigidsim.look.plots import Color, Plot, Series
+from rigidsim.look.plots import HUES, PALETTE, Plot
 from rigidsim.look.signals import values
-from rigidsim.look.solids import Array
+from rigidsim.look.solids import Array, Color
 from rigidsim.look.timeline.blueprint import build_comparison
 from rigidsim.look.timeline.drawn import Clock, DrawnRun, build_clock, dated
 from rigidsim.look.timeline.writing import chunks, recording_to
@@ -21,7 +21,6 @@ from rigidsim.scene.row_rotations import angles_between
 
 MOST = 6  # largest number of runs shown side by side
 ROWS = 20_000  # largest number of rows shown of each run
-COLORS = ((92, 148, 235), (240, 190, 60), (104, 190, 110), (225, 115, 190), (80, 200, 215), (235, 140, 80))
 _FLOOR = 1e-18  # rad: below what a difference of attitudes in double precision can be
 
 
@@ -80,27 +79,20 @@ def _named(run: DrawnRun, name: str, number: int) -> DrawnRun:
         )
         for stage in run.picture.stages[:1]
     ]
-    plots = []
-    for plot in run.plots:
-        series = [
-            replace(
-                one,
-                name=f"{root} {one.name}",
-                labels=[f"{title}: {label}" for label in one.labels],
-                colors=[_shade(COLORS[number], k) for k in range(len(one.labels))],
-            )
-            for one in plot.series
-        ]
-        shade = _shade(COLORS[number], 1)
-        levels = [
-            replace(one, key=f"{root} {one.key}", label=f"{title}: {one.label}", color=shade)
-            for one in plot.levels
-        ]
-        if plot.place != "more":
-            plots.append(replace(plot, series=series, levels=levels))
+    plots = [
+        replace(
+            plot,
+            name=f"{root} {plot.name}",
+            labels=[f"{title}: {label or plot.word}" for label in plot.labels],
+            levels={f"{title}: {label}": value for label, value in plot.levels.items()},
+            hues=[_shade(HUES[PALETTE[number]][1], k) for k in range(len(plot.labels))],
+        )
+        for plot in run.plots
+        if plot.place != "more"
+    ]
     pages = {f"{root}_{key}": text for key, text in run.pages.items() if key == "Summary"}
-    picture = replace(run.picture, stages=stages, planes=[])
-    return replace(run, picture=picture, plots=plots, planes=[], states=[], pages=pages)
+    picture = replace(run.picture, stages=stages)
+    return replace(run, picture=picture, plots=plots, paths=[], states=[], pages=pages)
 
 
 def _shade(color: Color, number: int) -> Color:
@@ -111,30 +103,31 @@ def _shade(color: Color, number: int) -> Color:
 
 
 def attitude_differences(named: Sequence[tuple[str, xarray.Dataset]]) -> Plot | None:
-    """log10 of the angle (rad) between the first run's attitude and each other's, at the first run's times,
+    """The angle (rad) between the first run's attitude and each other's, at the first run's times,
     where quaternions are interpolated on the arc. None if the first has no attitude, or no other has one
     then.
     """
-    (first_name, first), *others = named
+    (_, first), *others = named
     base = values(first, "quaternion")
     if base is None:
         return None
     times = np.asarray(first["time"].values, dtype=np.float64)
     base = base / np.linalg.norm(base, axis=1, keepdims=True)
-    series = []
-    for number, (name, table) in enumerate(others):
+    labels, columns = [], []
+    for name, table in others:
         quaternion = values(table, "quaternion")
         if quaternion is None:
             continue
         theirs = _at(times, np.asarray(table["time"].values, dtype=np.float64), quaternion)
         angle = angles_between(base, theirs)
-        if not np.isfinite(angle).any():
-            continue
-        label = f"{legible(name)} from {legible(first_name)}"
-        curve = np.log10(np.maximum(angle, _FLOOR))[:, None]
-        series.append(Series(f"difference {number + 1}", [label], [COLORS[number + 1]], curve))
-    title = "Angle between the attitudes [rad], log10"
-    return Plot("difference", title, "drift", series) if series else None
+        if np.isfinite(angle).any():
+            labels.append(f"{legible(name)} from {legible(named[0][0])}")
+            columns.append(np.maximum(angle, _FLOOR))
+    title, place = "Angle between the attitudes", "drift"
+    if not columns:
+        return None
+    hues = PALETTE[1:]  # of the others
+    return Plot("difference", title, np.stack(columns, axis=1), labels, "rad", hues, place=place, log=True)
 
 
 def _at(times: Array, theirs: Array, quaternion: Array) -> Array:

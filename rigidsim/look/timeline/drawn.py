@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Self
 
@@ -12,13 +12,16 @@ import xarray
 from numpy.typing import NDArray
 
 from rigidsim.look import signals
+from rigidsim.look.curves import CURVES
 from rigidsim.look.page import config_page, notes_page, summary_page
-from rigidsim.look.plots import Plot, Series, plan_plots
+from rigidsim.look.pages import leading
+from rigidsim.look.paths import PATHS, Path, sections
+from rigidsim.look.plots import Plot, drift_plot, other_plots
 from rigidsim.look.solids import Array
 from rigidsim.look.stages.bodies import Subject
-from rigidsim.look.stages.parts import Picture, Plane, Stage, screen_seconds
+from rigidsim.look.stages.parts import Picture, Stage, screen_seconds
 from rigidsim.look.stages.registry import build_picture
-from rigidsim.look.states import States, charts_of, sections_of, states_of
+from rigidsim.look.states import States, charts_of, states_of
 from rigidsim.look.thinning import by_extremes, thin, thinned_indices
 from rigidsim.look.timeline import drawing, plotting
 from rigidsim.scene.epochs import Epoch
@@ -117,7 +120,7 @@ class DrawnRun:
     picture: Picture
     subject: Subject
     plots: list[Plot]
-    planes: list[Plane]
+    paths: list[Path]
     states: list[States]
     clock: Clock
     seconds: Array
@@ -136,12 +139,11 @@ class DrawnRun:
         curves = rows
         if dataset.sizes["time"] > rows.sizes["time"]:
             curves = by_extremes(dataset, most).assign_attrs(dataset.attrs)
-        plots = plan_plots(curves.assign(picture.derived), picture.leading)
+        plots, paths = _about(rows, curves, picture)
         notes = list(picture.notes)
         if not clock.in_nanoseconds:
             notes.append(f"the run doesn't fit nanoseconds: its timeline is `{clock.name}`")
-            series = Series("time_seconds", ["time"], [(170, 170, 175)], seconds[:, None])
-            plots.append(Plot("time_seconds", "Time [s]", "more", [series]))
+            plots.append(Plot("time_seconds", "Time", seconds[:, None], unit="s", place="more"))
         pages = {
             "Summary": summary_page(dataset, rows),
             "Picture": notes_page(picture.kind, notes),
@@ -153,7 +155,7 @@ class DrawnRun:
             picture=picture,
             subject=subject,
             plots=plots,
-            planes=[*picture.planes, *sections_of(dataset)],
+            paths=[*paths, *sections(dataset)],
             states=[*states_of(dataset, start, end), *charts_of(rows)],
             clock=clock,
             seconds=seconds,
@@ -170,9 +172,8 @@ class DrawnRun:
             document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
             recording.log(f"/{name.lower()}", document, static=True)
         drawing.draw_static(recording, self.picture.stages)
-        plotting.draw_plot_styles(recording, self.plots)
-        plotting.draw_levels(recording, self.plots, self._times(np.array([0, len(self.seconds) - 1])))
-        plotting.draw_planes(recording, self.planes)
+        plotting.draw_plots(recording, self.plots, self._times(np.array([0, len(self.seconds) - 1])))
+        plotting.draw_paths(recording, self.paths)
         for lane in self.states:
             ticks = np.rint(lane.seconds / self.clock.seconds_per_tick).astype(np.int64)
             ticks += self.clock.since or 0
@@ -192,7 +193,7 @@ class DrawnRun:
                 mine = times if picked == rows else self._times(picked)
                 recording.send_columns(path, indexes=mine, columns=columns)
         plotting.draw_plot_rows(recording, self.plots, times, rows)
-        plotting.draw_plane_rows(recording, self.planes, times, rows)
+        plotting.draw_path_rows(recording, self.paths, times, rows)
 
     def _times(self, rows: slice | NDArray[np.int64]) -> list[rr.TimeColumn]:
         return [self._clock_column(self.clock.ticks[rows]), rr.TimeColumn("step", sequence=self.steps[rows])]
@@ -203,3 +204,23 @@ class DrawnRun:
         if self.clock.duration:
             return rr.TimeColumn(self.clock.name, duration=ticks.astype("timedelta64[ns]"))
         return rr.TimeColumn(self.clock.name, sequence=ticks)
+
+
+def _about(rows: xarray.Dataset, extremes: xarray.Dataset, picture: Picture) -> tuple[list[Plot], list[Path]]:
+    """Plots, what the scene is about first, and paths in planes; of what was recorded with extremes."""
+    curves, planes = leading(rows)
+    found = [plot for name in curves if (plot := CURVES[name](rows)) is not None]
+    first = [*found[:1], *picture.plots, *found[1:]][:MOST_LEADING]
+    first = [
+        replace(plot, values=extremes[plot.name].values.reshape(plot.values.shape) / plot.recorded)
+        if plot.recorded
+        else plot
+        for plot in first
+    ]
+    drift = drift_plot(extremes)
+    others = other_plots(extremes, [plot.name for plot in first])
+    paths = [path for name in planes if name in PATHS and (path := PATHS[name](rows)) is not None]
+    return [*first, *others, *([drift] if drift else [])], paths
+
+
+MOST_LEADING = 3  # plots beside the scene

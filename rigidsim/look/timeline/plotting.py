@@ -1,15 +1,17 @@
 """Plots, plane figures, states, the legend and the clock as rerun entities."""
 
 from collections.abc import Sequence
+from itertools import cycle
 from typing import Any
 
 import numpy as np
 import rerun as rr
 
-from rigidsim.look.plots import Plot
+from rigidsim.look.paths import Path
+from rigidsim.look.plots import Plot, screen
 from rigidsim.look.signals import joined
-from rigidsim.look.solids import Array
-from rigidsim.look.stages.parts import NEAR, Arrow, Color, Cone, Line, Plane, Stage, Trail, Vector
+from rigidsim.look.solids import Array, Color
+from rigidsim.look.stages.parts import NEAR, Arrow, Cone, Line, Stage, Trail, Vector
 from rigidsim.look.states import States
 
 PIXELS = 500  # about the width of a plot
@@ -22,27 +24,31 @@ LEGEND_LINE = 0.78
 """Height of a line of the legend, which is 30 units wide: about 24 of 950 points of the screen."""
 
 
-def plot_path(plot: Plot, name: str) -> str:
-    """Entity of one variable in one plot."""
-    folder = "/plots/drift/" if plot.place == "drift" else "/plots/"
-    return folder + rr.escape_entity_path_part(name)
+def plot_path(plot: Plot) -> str:
+    """Entity of a plot."""
+    return "/plots/" + rr.escape_entity_path_part(plot.name)
 
 
-def draw_plot_styles(recording: rr.RecordingStream, plots: Sequence[Plot]) -> None:
-    """Names and colours of the curves."""
+def draw_plots(recording: rr.RecordingStream, plots: Sequence[Plot], ends: list[rr.TimeColumn]) -> None:
+    """Names and colours of the curves, and lines for values that hold for the whole run, at its ends."""
     for plot in plots:
-        for series in plot.series:
-            style: dict[str, Any] = {
-                "names": series.labels,
-                "colors": series.colors,
-                "widths": [1.5] * len(series.labels),
-            }
-            look = (
-                rr.SeriesLines(**style, aggregation_policy=aggregation(plot, series.values))
-                if series.error is None
-                else rr.Measurements.from_fields(**style)
-            )
-            recording.log(plot_path(plot, series.name), look, static=True)
+        style: dict[str, Any] = {
+            "names": [label or plot.title for label in plot.labels],
+            "colors": [screen(hue) for hue, _ in zip(cycle(plot.hues), plot.labels, strict=False)],
+            "widths": [1.5] * len(plot.labels),
+        }
+        look = (
+            rr.SeriesLines(**style, aggregation_policy=aggregation(plot))
+            if plot.error is None
+            else rr.Measurements.from_fields(**style)
+        )
+        recording.log(plot_path(plot), look, static=True)
+        for number, (label, value) in enumerate(plot.levels.items()):
+            path = f"{plot_path(plot)}/level{number}"
+            line = rr.SeriesLines(names=[label], colors=[screen("grey")], widths=[1.0])
+            recording.log(path, line, static=True)
+            scalars = [np.log10(value) if plot.log else value] * 2
+            recording.send_columns(path, indexes=ends, columns=rr.Scalars.columns(scalars=scalars))
 
 
 def draw_plot_rows(
@@ -50,37 +56,29 @@ def draw_plot_rows(
 ) -> None:
     """The curves, for the rows of one chunk."""
     for plot in plots:
-        for series in plot.series:
-            values = series.values[rows]
-            if series.error is None:
-                columns = rr.Scalars.columns(scalars=values)
-            else:  # with a band of their uncertainty: the viewer draws the root of a variance
-                count = values.shape[1]
-                variances = np.repeat(series.error[rows] ** 2, count)
-                columns = rr.Measurements.columns(values=values.ravel(), variances=variances).partition(
-                    [count] * len(values)
-                )
-            recording.send_columns(plot_path(plot, series.name), indexes=times, columns=columns)
+        values = shown_values(plot)[rows]
+        columns: Any = rr.Scalars.columns(scalars=values)
+        if plot.error is not None:  # a band of their uncertainty: the viewer draws the root of a variance
+            count = values.shape[1]
+            variances = np.repeat(plot.error[rows] ** 2, count)
+            columns = rr.Measurements.columns(values=values.ravel(), variances=variances)
+            columns = columns.partition([count] * len(values))
+        recording.send_columns(plot_path(plot), indexes=times, columns=columns)
 
 
-def draw_levels(recording: rr.RecordingStream, plots: Sequence[Plot], ends: list[rr.TimeColumn]) -> None:
-    """Values that hold for the whole run, as level lines from the first to the last row's time."""
-    for plot in plots:
-        for level in plot.levels:
-            path = plot_path(plot, level.key)
-            style = rr.SeriesLines(names=[level.label], colors=[level.color], widths=[1.0])
-            recording.log(path, style, static=True)
-            columns = rr.Scalars.columns(scalars=[level.value, level.value])
-            recording.send_columns(path, indexes=ends, columns=columns)
+def shown_values(plot: Plot) -> Array:
+    """Values as the viewer shows them: of what has a logarithmic axis the logarithms, and gaps for zeros."""
+    if not plot.log:
+        return plot.values
+    return np.log10(plot.values, where=plot.values > 0, out=np.full_like(plot.values, np.nan))
 
 
-def aggregation(plot: Plot, values: Array) -> rr.components.AggregationPolicy:
-    """Which of the rows (rows, components) that fall into one pixel the viewer draws: their average, which is
-    smooth, where no component moves by more than a hundredth of its own range within a pixel; else the
-    extremes, as an average would show a fast rotation with a vanishing amplitude. Of a drift only the largest
-    counts.
+def aggregation(plot: Plot) -> rr.components.AggregationPolicy:
+    """Which of the rows that fall into one pixel the viewer draws: their average, which is smooth, where no
+    curve moves by more than a hundredth of its own range within a pixel; else the extremes, as an average
+    would show a fast rotation with a vanishing amplitude. Of a drift only the largest counts.
     """
-    policies = rr.components.AggregationPolicy
+    policies, values = rr.components.AggregationPolicy, plot.values
     if plot.place == "drift":
         return policies.Max
     step = len(values) // PIXELS
@@ -93,61 +91,58 @@ def aggregation(plot: Plot, values: Array) -> rr.components.AggregationPolicy:
     return policies.Average if (moved <= _SMOOTH * ranges)[np.isfinite(moved)].all() else policies.MinMax
 
 
-def draw_planes(recording: rr.RecordingStream, planes: Sequence[Plane]) -> None:
+def draw_paths(recording: rr.RecordingStream, paths: Sequence[Path]) -> None:
     """Draw the static parts of plane figures: the whole path, circles, axes."""
     angle = np.linspace(0, 2 * np.pi, 121)
-    for plane in planes:
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    for path in paths:
 
-        def log(name: str, part: rr.AsComponents, path: str = f"/planes/{plane.key}") -> None:
-            recording.log(f"{path}/{name}", part, static=True)
+        def log(name: str, part: rr.AsComponents, entity: str = f"/planes/{path.name}") -> None:
+            recording.log(f"{entity}/{name}", part, static=True)
 
-        points = flipped(plane.points)
-        finite = points[np.isfinite(points).all(axis=1)]
+        finite = flipped(path.points[np.isfinite(path.points).all(axis=1)])
         whole = finite[:: max(len(finite) // 4000, 1)]
-        dim: Color = tuple(round(0.5 * x) for x in plane.color)  # type: ignore[assignment]
-        if len(whole) > 1 and plane.moves and joined(whole, NEAR):
+        bright = screen(path.hue)
+        dim: Color = tuple(round(0.5 * x) for x in bright)  # type: ignore[assignment]
+        if len(whole) > 1 and path.moves and not path.sparse and joined(whole, NEAR):
             log("whole", _faint([whole], color=dim, width=0.9, order=1.0))
         else:
-            color = dim if plane.moves else plane.color
-            log("whole", rr.Points2D(whole, colors=[color], radii=rr.Radius.ui_points(1.6)))
-        margin = 0.1 * plane_reach(plane)
-        left, top = np.min(whole, axis=0, initial=0.0) - margin
-        right, bottom = np.max(whole, axis=0, initial=0.0) + margin
-        log("axes", _faint([[(left, 0), (right, 0)], [(0, top), (0, bottom)]]))
-        if any(plane.names):
-            log("axes/names", _texts([(right, 0), (0, top)], list(plane.names)))
-        for number, (radius, label) in enumerate(plane.rings):
-            log(f"rings/{number}", _faint([radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)]))
-            at = 0.9 - 0.35 * (number % 2)  # neighbours' labels lie apart
+            log("whole", rr.Points2D(whole, colors=[dim if path.moves else bright], radii=_points(1.6)))
+        reach = path.reach
+        power = 10.0 ** np.floor(np.log10(reach))
+        step = next(s for s in (5, 2, 1, 0.5) if s * power <= 0.75 * reach) * power
+        ends = [(1.1 * reach, 0), (0, -1.1 * reach)]
+        log("axes", _faint([[(-x, -y), (x, y)] for x, y in ends]))
+        log("axes/names", _texts(ends, list(path.labels)))
+        for number in (1, 2):
+            radius, at = number * step, 0.9 - 0.35 * (number % 2)  # neighbours' labels lie apart
+            log(f"rings/{number}", _faint([radius * circle]))
+            label = f"{radius:.3g} {path.unit}".strip()
             log(f"rings/{number}/label", _texts([(radius * np.cos(at), radius * np.sin(at))], [label]))
-        if plane.moves:
-            size = rr.Radius.ui_points(5.0)
-            log("now", rr.Points2D.from_fields(colors=[plane.color], radii=size, draw_order=3.0))
+        if path.moves:
+            log("now", rr.Points2D.from_fields(colors=[bright], radii=_points(5.0), draw_order=3.0))
+
+
+def _points(size: float) -> Any:
+    return rr.Radius.ui_points(size)
 
 
 def _faint(strips: Any, *, color: Color = _FAINT, width: float = 0.5, order: float = -1.0) -> rr.LineStrips2D:
-    return rr.LineStrips2D(strips, colors=[color], radii=rr.Radius.ui_points(width), draw_order=order)
+    return rr.LineStrips2D(strips, colors=[color], radii=_points(width), draw_order=order)
 
 
 def _texts(places: Any, labels: list[str]) -> rr.Points2D:
     return rr.Points2D(places, labels=labels, colors=[_INK], radii=0.0, show_labels=True)
 
 
-def draw_plane_rows(
-    recording: rr.RecordingStream, planes: Sequence[Plane], times: list[rr.TimeColumn], rows: slice
+def draw_path_rows(
+    recording: rr.RecordingStream, paths: Sequence[Path], times: list[rr.TimeColumn], rows: slice
 ) -> None:
     """The moving points of plane figures."""
-    for plane in planes:
-        if plane.moves:
-            places = flipped(plane.points[rows]).astype(np.float32)
-            columns = rr.Points2D.columns(positions=places)
-            recording.send_columns(f"/planes/{plane.key}/now", indexes=times, columns=columns)
-
-
-def plane_reach(plane: Plane) -> float:
-    """Extent of what is drawn of a plane figure, from its origin."""
-    finite = plane.points[np.isfinite(plane.points).all(axis=1)]
-    return float(np.abs(finite).max(initial=0.0)) or 1.0
+    for path in paths:
+        if path.moves:
+            columns = rr.Points2D.columns(positions=flipped(path.points[rows]).astype(np.float32))
+            recording.send_columns(f"/planes/{path.name}/now", indexes=times, columns=columns)
 
 
 def flipped(points: Array) -> Array:

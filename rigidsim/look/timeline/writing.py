@@ -124,7 +124,7 @@ def _scales_of(run: DrawnRun) -> tuple[object, ...]:
     picture = run.picture
     arrows = [(s.root, a.name, *np.round(a.vectors[0], 4)) for s in picture.stages for a in s.arrows]
     trails = [(s.root, t.name, t.line, *np.round(t.points[0], 4)) for s in picture.stages for t in s.trails]
-    plots = [(p.title, p.place, len(p.series)) for p in run.plots]
+    plots = [(p.heading, p.place, len(p.labels)) for p in run.plots]
     stages = [
         (s.root, s.title, s.unit, len(s.lines), *(line.words for line in s.lines)) for s in picture.stages
     ]

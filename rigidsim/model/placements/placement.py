@@ -136,7 +136,7 @@ class Placement(ABC):
         return False
 
     def pictured(self) -> dict[str, Any]:
-        """What a timeline draws it by (``rigidsim.look.surroundings``)."""
+        """What a timeline draws it by (``rigidsim.look.record``)."""
         return {}
 
     def cautions(self, fields: LoadFields, given: Any, where: str, scene: Scene) -> Iterator[Caution]:

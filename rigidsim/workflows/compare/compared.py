@@ -37,7 +37,6 @@ WITHIN = 1e-9
 FIGURES = (".png", ".svg")
 _FAR_AWAY = 10.0  # spans of the file or of the experiment, beyond which times are counted from another zero
 _MOST_SHOWN = 20_000  # rows of a timeline
-_DRAWN = ("drawing", "principal_moments", "principal_axes", "center_of_mass", "mass", "surroundings")
 """Attributes of a run's dataset that its body is drawn by."""
 
 
@@ -291,7 +290,7 @@ def _draw(experiment: Experiment, given: Attitudes, found: Convention, path: Pat
 
     rows = np.unique(np.linspace(0, len(given.times) - 1, min(len(given.times), _MOST_SHOWN)).astype(int))
     own, name = _sampled(experiment, given.times[rows]).dataset, Path(given.trajectory.source).stem
-    looks = {key: own.attrs[key] for key in _DRAWN if key in own.attrs} | {"title": name}
+    looks = {"scene": own.attrs["scene"], "title": name}
     theirs, mine = dataset_of_rows(given.at(rows), found, looks), str(own.attrs.get("title", "experiment"))
     try:
         with writing(path) as temporary:

@@ -1,0 +1,243 @@
+"""Where axes point and what they trace, as paths in a plane: one form for figures and timelines."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import xarray
+
+from rigidsim.look import fits, signals, sources
+from rigidsim.look.curves import precesses
+from rigidsim.look.record import scene_of
+from rigidsim.look.solids import Array
+from rigidsim.look.states import events_of
+from rigidsim.look.units import angle_scale, angle_text, scaled, with_unit
+from rigidsim.scene.readable import si_scale, span_text
+
+_TURN = 2 * np.pi
+_SMALL = 0.05  # rad: sines of smaller angles read as angles
+_FAR = 0.5  # rad from its mean motion, up to which a pole's path is as on a plane to a tenth
+_SAME = 0.005  # of a path's reach, within which two are one
+_SECTION_POINTS = 8  # least number of points for a section to be drawn
+_SECTIONS = ("libration", "polar_motion", "tip", "nadir", "angular_velocity", "euler_angles")
+
+
+@dataclass(frozen=True)
+class Path:
+    """A path (rows, 2) in a unit, whose point moves along time, or points that stand for themselves.
+
+    Attributes:
+        across, up: what the axes count. center: what is at the origin; without, that isn't marked.
+        others: further paths by name. ellipse: points of the one that is closest, and words on it.
+        sparse: samples are too far apart to be joined. moves: the point moves along time.
+    """
+
+    name: str
+    title: str
+    points: Array
+    across: str
+    up: str
+    unit: str = ""
+    hue: str = "blue"
+    center: str = ""
+    others: Mapping[str, Array] = field(default_factory=dict)
+    ellipse: tuple[Array, str] | None = None
+    sparse: bool = False
+    moves: bool = True
+
+    @property
+    def reach(self) -> float:
+        """Extent of what is drawn, from the origin."""
+        return float(np.nanmax(np.abs(self.points), initial=0.0)) or 1.0
+
+    @property
+    def labels(self) -> tuple[str, str]:
+        """Names of both axes with the unit."""
+        return with_unit(self.across, self.unit), with_unit(self.up, self.unit)
+
+
+Find = Callable[[xarray.Dataset], Path | None]
+
+
+def once_round(dataset: xarray.Dataset, plane: Array, digits: int) -> str:
+    """Words on the period and the sense in which a point goes round the origin; empty if it doesn't."""
+    mean = fits.circulation(signals.seconds(dataset), plane)
+    if mean is None:
+        return ""
+    way = "counterclockwise" if mean.rate > 0 else "clockwise"
+    return f": once round in {mean.about}{span_text(_TURN / abs(mean.rate), digits)}, {way}"
+
+
+def polar_motion(dataset: xarray.Dataset) -> Path | None:
+    """The spin axis seen from the figure axis, m1 to the right and m2 up, and its period."""
+    plane = signals.polar_motion(dataset) if signals.near_axis(dataset) else None
+    if plane is None:
+        return None
+    scale, unit = angle_scale(plane)
+    sparse = signals.wobble_aliased(dataset)
+    radius = signals.norms(plane)
+    least, most = float(np.nanmin(radius)), float(np.nanmax(radius))
+    title = "Polar motion" + ("" if sparse else once_round(dataset, plane, 5)) + ", "
+    title += f"{angle_text(least, like=most)} to " if most - least > 1e-3 * most else ""
+    title += angle_text(most)
+    labels = {"unit": unit, "hue": "pink", "center": "figure axis"}
+    return Path("polar_motion", title, plane / scale, "m₁", "m₂", **labels, sparse=sparse)
+
+
+def pole_path(dataset: xarray.Dataset) -> Path | None:
+    """Path of the figure axis in space, seen from outside along the pole that it circles: of a free body the
+    momentum, else the reference plane's. Distances from the centre are angles.
+    """
+    along, paths = signals.steady_momentum(dataset), {}
+    names, center, title = ("along X", "along Y"), "reference pole", "Path of the pole in space"
+    if along is not None:
+        names, center = ("across the momentum",) * 2, "momentum"
+        title = "Path of the figure axis in space"
+        first, second = signals.across(along)
+        for name in ("figure", "spin", "core"):
+            axis = signals.pole(dataset, name)
+            if axis is not None:
+                paths[name] = flat(axis @ first, axis @ second, axis @ along)
+    else:
+        for name in ("figure", "momentum"):
+            found = signals.orientation(dataset, name)
+            if found is not None:
+                tilt, node = found
+                paths[name] = np.stack([tilt * np.sin(node), -tilt * np.cos(node)], axis=1)
+    if not paths:
+        return None
+    first, *rest = paths
+    shown = paths[first]
+    reach = max(float(np.nanmax(np.abs(shown - np.nanmean(shown, axis=0)))), 1e-300)
+    others = {n: paths[n] for n in rest if not np.nanmax(np.abs(paths[n] - shown)) < _SAME * reach}
+    if np.nanmin(signals.norms(shown)) > 3 * reach:  # so far that it would press the path flat
+        center = ""
+    scale, unit = angle_scale(shown)
+    sparse = along is not None and signals.aliased(dataset)
+    title += "" if sparse else once_round(dataset, shown, 4)
+    others = {f"{name} axis": path / scale for name, path in others.items()}
+    return Path("pole_path", title, shown / scale, *names, unit, "blue", center, others, sparse=sparse)
+
+
+def flat(x: Array, y: Array, z: Array) -> Array:
+    """Directions (rows,) each as points (rows, 2) whose distance from the centre is the angle from z, rad."""
+    plane = np.stack([x, y], axis=1)
+    size = signals.norms(plane)
+    ratio = np.divide(np.arctan2(size, z), size, out=np.ones_like(size), where=size > 1e-12)
+    return np.asarray(plane * ratio[:, None])
+
+
+def nutation(dataset: xarray.Dataset) -> Path | None:
+    """A precessing figure axis, else the momentum, less its mean motion, if that stays small, and its
+    strongest part: longitude of the node, times sin of the mean obliquity, across, and obliquity up.
+    """
+    found = signals.orientation(dataset, "figure") or signals.orientation(dataset, "momentum")
+    if found is None or not precesses(dataset):
+        return None
+    (tilt, node), seconds = found, signals.seconds(dataset)
+    mean = fits.secular(seconds, tilt).value
+    path = np.stack([(node - fits.secular(seconds, node).at(seconds)) * np.sin(mean), tilt - mean], axis=1)
+    if not 0 < np.nanmax(signals.norms(path)) < _FAR:
+        return None
+    ellipse, (scale, unit) = fits.leading_ellipse(seconds, node, tilt, float(np.sin(mean))), angle_scale(path)
+    drawn = None
+    if ellipse is not None:
+        long, short = (angle_text(size, 3) for size in ellipse.semi_axes)
+        words = f"{span_text(_TURN / ellipse.rate, 3)}: semi-axes {long}, {short}"
+        drawn = ellipse.curve() / scale, words
+    title, labels = "Nutation: the pole about its mean motion", ("Δlongitude · sin(obliquity)", "Δobliquity")
+    return Path("nutation", title, path / scale, *labels, unit, ellipse=drawn)
+
+
+def tip(dataset: xarray.Dataset) -> Path | None:
+    """A top's tip, recorded or the end of the unit figure axis, seen from above."""
+    points, what, unit = signals.values(dataset, "tip", 3), "Tip", "m"
+    if points is None:
+        points, what, unit = signals.pole(dataset, "figure"), "Figure axis", ""
+    if points is None or not signals.is_top(dataset):
+        return None
+    up = scene_of(dataset).vertical
+    across = np.eye(3)[1 if abs(up[0]) > 0.9 else 0]  # X and Y if Z is up
+    across = across - (across @ up) * up
+    across /= np.linalg.norm(across)
+    plane = np.stack([points @ across, points @ np.cross(up, across)], axis=1)
+    scale, unit = si_scale(plane, unit) if unit else (1.0, "")
+    if what != "Tip" and np.nanmax(np.abs(plane)) < _SMALL:  # components of a unit vector are angles
+        scale, unit = angle_scale(plane)
+    names = ("X", "Y") if np.allclose(up, [0, 0, 1]) else ("across", "across")
+    return Path("tip", f"{what}, seen from above", plane / scale, *names, unit, center="vertical")
+
+
+def nadir(dataset: xarray.Dataset) -> Path | None:
+    """Direction of the source in body axes, about the axis that it is near to."""
+    directions = sources.toward(dataset)
+    if directions is None:
+        return None
+    mean = np.nanmean(directions, axis=0)
+    k = int(np.abs(mean).argmax())
+    i, j = (k + 1) % 3, (k + 2) % 3
+    plane = flat(*(directions[:, [i, j, k]] * np.sign(mean[k])).T)
+    scale, unit = angle_scale(plane)
+    sign = "" if mean[k] > 0 else "−"
+    names = (f"towards {sign}{'xyz'[axis]}" for axis in (i, j))
+    center = f"{sign}{'xyz'[k]} axis"
+    return Path("nadir", "The source seen from the body", plane / scale, *names, unit, center=center)
+
+
+def sub_source(dataset: xarray.Dataset) -> Path | None:
+    """The point under a source that a body always faces, from longitude and latitude zero."""
+    found = sources.seen(dataset)
+    if found is None or not np.isfinite(found.directions).all() or not found.stays():
+        return None
+    plane = found.coordinates(scene_of(dataset).figure)
+    scale, unit = angle_scale(plane)
+    title = f"Sub-{found.body.name if found.body else 'source'} point"
+    return Path("sub_source", title, plane / scale, "longitude", "latitude", unit, "orange", "zero")
+
+
+def herpolhode(dataset: xarray.Dataset) -> Path | None:
+    """The tip of the angular velocity on the invariable plane, seen along the momentum."""
+    plane = herpolhode_plane(dataset)
+    if plane is None:
+        return None
+    scale, unit = si_scale(plane, "rad/s")
+    title = "Herpolhode on the invariable plane"
+    return Path("herpolhode", title, plane / scale, "across L", "across L", unit, center="L")
+
+
+def herpolhode_plane(dataset: xarray.Dataset) -> Array | None:
+    """Component of the angular velocity across the momentum (rows, 2), rad/s; None if the momentum moves."""
+    along, rates = signals.steady_momentum(dataset), signals.values(dataset, "angular_velocity", 3)
+    turning = None if rates is None or along is None else signals.in_space(dataset, rates)
+    return None if turning is None or along is None else turning @ np.stack(signals.across(along), axis=1)
+
+
+PATHS: dict[str, Find] = {
+    find.__name__: find for find in (polar_motion, pole_path, nutation, tip, nadir, sub_source, herpolhode)
+}
+"""All of them by name."""
+
+
+def sections(dataset: xarray.Dataset) -> list[Path]:
+    """For each frequent event, two components recorded there, as points."""
+    found = []
+    for event in events_of(dataset):
+        for name in _SECTIONS:
+            full = f"{event}_{name}"
+            table = np.asarray(dataset[full].values, dtype=float) if full in dataset else np.zeros(0)
+            if table.ndim != 2 or len(table := signals.finite_rows(table)) < _SECTION_POINTS:
+                continue
+            one, other = sorted(np.argsort(np.ptp(table, axis=0))[-2:])
+            dimension = str(dataset[full].dims[1])
+            labels = dataset[dimension].values if dimension in dataset else np.arange(table.shape[1])
+            divisor, unit = scaled(table, str(dataset[full].attrs.get("units", "")))
+            # the origin is their middle, which the names tell: a small section would be a dot far off
+            points = table[:, [one, other]] / divisor
+            middle = (points.min(axis=0) + points.max(axis=0)) / 2
+            names = (f"{labels[k]} − {at:.4g}" for k, at in zip((one, other), middle, strict=True))
+            title = f"Section at {event}: {name.replace('_', ' ')}"
+            found.append(
+                Path(f"section_{event}", title, points - middle, *names, unit, "orange", moves=False)
+            )
+            break
+    return found
