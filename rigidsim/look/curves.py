@@ -290,7 +290,11 @@ def latitude_libration(dataset: xarray.Dataset) -> Plot | None:
         return None
     labels = ("inclination less its mean", "node less its mean motion, × sin(inclination)")
     table, title = np.stack([found.inclination, found.node], axis=1), "Physical librations in latitude"
-    options: dict[str, Any] = {"labels": labels, "hues": ("orange", "violet"), "window": _WINDOW * loop_rows(table[:, 0])}
+    options: dict[str, Any] = {
+        "labels": labels,
+        "hues": ("orange", "violet"),
+        "window": _WINDOW * loop_rows(table[:, 0]),
+    }
     return plotted(dataset, "latitude_libration", title, table, **options)
 
 

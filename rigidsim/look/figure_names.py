@@ -4,7 +4,7 @@ OVERVIEW = "overview"  # the page that suits the scene
 SPECTRUM = "spectrum"  # of a run's analysis
 
 FIGURES: dict[str, str] = {
-    OVERVIEW: "the page that suits the scene: its leading figures, drifts, and the motion's numbers (the default)",
+    OVERVIEW: "the page that suits the scene: its leading figures, drifts, the motion's numbers (default)",
     "polar_motion": "the spin axis about the figure axis: circle, period, m1 and m2 over time",
     "pole_path": "path of the figure axis in space, and about its mean motion where that precesses",
     "nutation": "nutation ellipse: the pole about its mean motion",

@@ -78,7 +78,9 @@ def numbers(rows: xarray.Dataset) -> list[tuple[str, str]]:
     )
     wobbling = None if plane is None else circulation(seconds, plane)
     if wobbling is not None:
-        found.append(("polar motion once round in", wobbling.about + span_text(2 * np.pi / wobbling.rate, 5)))
+        found.append(
+            ("polar motion once round in", wobbling.about + span_text(2 * np.pi / abs(wobbling.rate), 5))
+        )
     precessing = signals.values(rows, "precession_angle")
     if precessing is not None:
         found.append(("precession", turning_text(secular(seconds, precessing).rate)))
@@ -86,7 +88,7 @@ def numbers(rows: xarray.Dataset) -> list[tuple[str, str]]:
         name, (_, node) = next(iter(orientations(rows).items()))
         mean = secular(seconds, node)
         if abs(mean.rate) * np.ptp(seconds) > _LEAST and np.isfinite(node).all():
-            found.append((f"{name} axis precesses in", mean.about + span_text(2 * np.pi / mean.rate, 4)))
+            found.append((f"{name} axis precesses in", mean.about + span_text(2 * np.pi / abs(mean.rate), 4)))
     for name, words in (("tilt", "tilt"), ("nutation_angle", "nutation angle"), ("obliquity", "obliquity")):
         table = signals.values(rows, name)
         if table is not None and np.isfinite(table).any():

@@ -24,7 +24,7 @@ ROWS = 20_000  # that a figure draws
 
 _TELLING = 0.5  # changes of sign to a sample: four samples a swing
 _CYCLES, _MANY = 14, 60  # swings shown of the start, where there are more than so many
-_NAME = 38  # letters that a name in the table has room for
+_NAME = 30  # letters that a name in the table has room for
 _BANDS = 400  # parts of a panel's width, each with the least and the largest value in it
 _CURVE, _PLANE, _FACT = 2.55, 4.7, 0.235  # heights, inches
 _WIDE, _NARROW = 12.4, 8.2
@@ -196,4 +196,4 @@ def _table(axes: Axes, lines: list[tuple[str, str]]) -> None:
         height = 1.0 - (row + 0.5) / (len(lines) + 1)
         fitting = min(9.0, 9.0 * _NAME / len(name))
         axes.text(0.04, height, name, color=GREY, fontsize=fitting, va="center", clip_on=False)
-        axes.text(0.70, height, value, color=INK, fontsize=9, va="center", clip_on=False)
+        axes.text(0.56, height, value, color=INK, fontsize=9, va="center", clip_on=False)
