@@ -37,7 +37,6 @@ WITHIN = 1e-9
 FIGURES = (".png", ".svg")
 _FAR_AWAY = 10.0  # spans of the file or of the experiment, beyond which times are counted from another zero
 _MOST_SHOWN = 20_000  # rows of a timeline
-"""Attributes of a run's dataset that its body is drawn by."""
 
 
 def compare(
