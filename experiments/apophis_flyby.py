@@ -28,7 +28,6 @@ Held against:
 """
 
 import re
-import sys
 import tempfile
 from dataclasses import dataclass
 from typing import Any
@@ -174,7 +173,7 @@ def axes_of(drawn: Draws) -> dict[str, str]:
     return {key: f'{{values = {vectors(rows)}, name = "{name}"}}' for key, (name, rows) in listed.items()}
 
 
-def config() -> str:
+def config_text() -> str:
     """The text of ``configs/sweeps/apophis_flyby.toml``, its orbit and its draws made anew."""
     text, mark, _ = CONFIG.read_text(encoding="utf-8").partition("# drawn:\n")
     for key, vector in zip(("position", "velocity"), hyperbola(-DAYS * 86400), strict=True):
@@ -184,9 +183,48 @@ def config() -> str:
     return text + mark + "".join(axes).replace("], [", "],\n    [")
 
 
+def _longitude(poles: np.ndarray) -> np.ndarray:
+    return np.asarray(np.arctan2(poles[:, 1], poles[:, 0]))
+
+
+def picture(drawn: Draws, after: Tumbling, poles: np.ndarray, shift: np.ndarray) -> Picture:
+    """Poles, periods and excitation, before and after."""
+
+    def away(directions: np.ndarray) -> np.ndarray:
+        return np.asarray(90 + np.degrees(np.arcsin(np.clip(directions[:, 2], -1, 1))))
+
+    def hours(effective: np.ndarray) -> np.ndarray:
+        return 2 * np.pi / effective / HOUR
+
+    def ticks(axes: Any) -> None:
+        axes.set_xticks([10, 20, 30, 50, 100], ["10", "20", "30", "50", "100"])
+        axes.minorticks_off()
+
+    sky = [Curve(_longitude(one), away(one), label, color, ".", 0.7, {"alpha": 0.5})
+           for one, label, color in ((poles, "after", "orange"),
+                                     (drawn.poles, "before", "blue"))]  # fmt: skip
+    plane = [Curve(hours(after.effective[rows]), after.excitation[rows], label, color, ".", 0.6)
+             for rows, label, color in ((after.short, "after, short-axis mode", "orange"),
+                                        (~after.short, "after, long-axis mode", "grey"))]  # fmt: skip
+    plane.append(Curve(hours(drawn.state.effective), drawn.state.excitation, "before", "blue", ".", 0.6))
+    stay, limit = (100 * after.short.mean(), Curve(10, None, "10°, likely (Benson et al. 2023)", "orange"))
+    title = f"After the Earth: {stay:.0f} % still in short-axis mode, poles and periods scattered"
+    return Picture(title, "abc", [
+        Panel("Pole, in degrees from the ecliptic's south pole", "", "", sky, legend="lower left",
+              limits={"ylim": (0, float(np.quantile(away(poles), 0.998)))}),
+        Panel("How fast, and how much it tumbles", "effective period 2π L/2E (h)", "excitation E/E0", plane,
+              "x", legend="upper right", more=ticks),
+        Panel(f"Median {np.median(shift):.0f}°", "pole shifted by (degrees)", "members", [limit],
+              more=lambda axes: axes.hist(shift, bins=np.arange(0, 61, 1.5), color="grey", alpha=0.8)),
+    ], (14, 5.2), {"per_subplot_kw": {"a": {"projection": "polar"}}})  # fmt: skip
+
+
 @Study
-def study(full: bool) -> Answer:
-    """Many members through the pass, the figure, the checks."""
+def study(full: bool, config: bool = False) -> Answer:
+    """Many members through the pass, the figure, the checks; or the text of the config alone."""
+    if config:
+        print(config_text(), end="")
+        return [], None
     members = 8192 if full else 512
     drawn = draws(members)
     settings = [f'sweep.axes."{key}"={text}' for key, text in axes_of(drawn).items()]
@@ -242,45 +280,3 @@ def study(full: bool) -> Answer:
               "closed form; the body's size makes (170 m / 38,000 km)^2 = 2e-11", "absolute"),
         Check("largest drift over its bound", max(drifts), 0, 1, "1", "round-off law", "absolute"),
     ], figure  # fmt: skip
-
-
-def _longitude(poles: np.ndarray) -> np.ndarray:
-    return np.asarray(np.arctan2(poles[:, 1], poles[:, 0]))
-
-
-def picture(drawn: Draws, after: Tumbling, poles: np.ndarray, shift: np.ndarray) -> Picture:
-    """Poles, periods and excitation, before and after."""
-
-    def away(directions: np.ndarray) -> np.ndarray:
-        return np.asarray(90 + np.degrees(np.arcsin(np.clip(directions[:, 2], -1, 1))))
-
-    def hours(effective: np.ndarray) -> np.ndarray:
-        return 2 * np.pi / effective / HOUR
-
-    def ticks(axes: Any) -> None:
-        axes.set_xticks([10, 20, 30, 50, 100], ["10", "20", "30", "50", "100"])
-        axes.minorticks_off()
-
-    sky = [Curve(_longitude(one), away(one), label, color, ".", 0.7, {"alpha": 0.5})
-           for one, label, color in ((poles, "after", "orange"),
-                                     (drawn.poles, "before", "blue"))]  # fmt: skip
-    plane = [Curve(hours(after.effective[rows]), after.excitation[rows], label, color, ".", 0.6)
-             for rows, label, color in ((after.short, "after, short-axis mode", "orange"),
-                                        (~after.short, "after, long-axis mode", "grey"))]  # fmt: skip
-    plane.append(Curve(hours(drawn.state.effective), drawn.state.excitation, "before", "blue", ".", 0.6))
-    stay, limit = (100 * after.short.mean(), Curve(10, None, "10°, likely (Benson et al. 2023)", "orange"))
-    title = f"After the Earth: {stay:.0f} % still in short-axis mode, poles and periods scattered"
-    return Picture(title, "abc", [
-        Panel("Pole, in degrees from the ecliptic's south pole", "", "", sky, legend="lower left",
-              limits={"ylim": (0, float(np.quantile(away(poles), 0.998)))}),
-        Panel("How fast, and how much it tumbles", "effective period 2π L/2E (h)", "excitation E/E0", plane,
-              "x", legend="upper right", more=ticks),
-        Panel(f"Median {np.median(shift):.0f}°", "pole shifted by (degrees)", "members", [limit],
-              more=lambda axes: axes.hist(shift, bins=np.arange(0, 61, 1.5), color="grey", alpha=0.8)),
-    ], (14, 5.2), {"per_subplot_kw": {"a": {"projection": "polar"}}})  # fmt: skip
-
-
-if __name__ == "__main__":
-    if "--config" not in sys.argv:
-        raise SystemExit(study.main())
-    print(config(), end="")

@@ -88,6 +88,38 @@ def hyperbolas(drawn: flyby.Draws) -> tuple[np.ndarray, np.ndarray]:
     return rates, momentum / np.linalg.norm(momentum, axis=1)[:, None]
 
 
+def angle(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Between directions, deg."""
+    return np.asarray(np.degrees(np.arctan2(
+        np.linalg.norm(np.cross(one, other), axis=1), (one * other).sum(axis=1))))  # fmt: skip
+
+
+def picture(
+    scene: Result, drawn: flyby.Draws, after: Tumbling, shift: np.ndarray, apart: np.ndarray
+) -> Picture:
+    """The pass and the momentum, and members on both orbits."""
+    hours = scene.values("time") / 3600 - 48
+    momentum = scene.values("angular_momentum")
+    size = np.linalg.norm(momentum, axis=1)
+    poles = momentum / size[:, None]
+    ratio = after.effective / drawn.state.effective
+    title = "Apophis past the Earth: a new rotation, to which Moon and Sun hardly matter"
+    return Picture(title, "abc", [
+        Panel("Distance from the Earth (dashed: the Moon's)", "hours from perigee", "1000 km", [
+            Curve(hours, np.linalg.norm(scene.values("position"), axis=1) / 1e6),
+            Curve(None, 384.4, "", "grey", "--", 0.8),
+        ], "y"),
+        Panel("Angular momentum of the ready scene", "hours from perigee", "change", [
+            Curve(hours, angle(poles, np.broadcast_to(poles[0], poles.shape)), "pole, deg"),
+            Curve(hours, 100 * (size / size[0] - 1), "size, %", "orange"),
+        ], limits={"xlim": (-12, 12)}, legend="center right"),
+        Panel("Members: worth of Moon, Sun and planets (blue)", "pole shifted by, deg", "", [
+            Curve(shift, apart, "pole, deg", "blue", "o"),
+            Curve(shift, 100 * np.abs(ratio - 1), "change of the rate, %", "orange", "o"),
+        ], "y", legend="center right"),
+    ], (14, 4.8))  # fmt: skip
+
+
 @Study
 def study(full: bool) -> Answer:
     """The orbit, and members on both."""
@@ -121,39 +153,3 @@ def study(full: bool) -> Answer:
         Check("effective rate over that about the Earth alone, median",
               float(np.median(after.effective / alone.effective)), 1.0, 1e-3, "1", none, "absolute"),
     ], figure  # fmt: skip
-
-
-def angle(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Between directions, deg."""
-    return np.asarray(np.degrees(np.arctan2(
-        np.linalg.norm(np.cross(one, other), axis=1), (one * other).sum(axis=1))))  # fmt: skip
-
-
-def picture(
-    scene: Result, drawn: flyby.Draws, after: Tumbling, shift: np.ndarray, apart: np.ndarray
-) -> Picture:
-    """The pass and the momentum, and members on both orbits."""
-    hours = scene.values("time") / 3600 - 48
-    momentum = scene.values("angular_momentum")
-    size = np.linalg.norm(momentum, axis=1)
-    poles = momentum / size[:, None]
-    ratio = after.effective / drawn.state.effective
-    title = "Apophis past the Earth: a new rotation, to which Moon and Sun hardly matter"
-    return Picture(title, "abc", [
-        Panel("Distance from the Earth (dashed: the Moon's)", "hours from perigee", "1000 km", [
-            Curve(hours, np.linalg.norm(scene.values("position"), axis=1) / 1e6),
-            Curve(None, 384.4, "", "grey", "--", 0.8),
-        ], "y"),
-        Panel("Angular momentum of the ready scene", "hours from perigee", "change", [
-            Curve(hours, angle(poles, np.broadcast_to(poles[0], poles.shape)), "pole, deg"),
-            Curve(hours, 100 * (size / size[0] - 1), "size, %", "orange"),
-        ], limits={"xlim": (-12, 12)}, legend="center right"),
-        Panel("Members: worth of Moon, Sun and planets (blue)", "pole shifted by, deg", "", [
-            Curve(shift, apart, "pole, deg", "blue", "o"),
-            Curve(shift, 100 * np.abs(ratio - 1), "change of the rate, %", "orange", "o"),
-        ], "y", legend="center right"),
-    ], (14, 4.8))  # fmt: skip
-
-
-if __name__ == "__main__":
-    raise SystemExit(study.main())

@@ -275,6 +275,23 @@ def find(case: Case) -> Found:
     )
 
 
+def picture(shown: list[tuple[Case, Found]]) -> Picture:
+    """The pole's path about its state, in the frame of the node."""
+    panels = []
+    for case, found in shown:
+        labels = ("from the balance", "from the state found", "the same by the linear theory")
+        drawn = list(zip(found.paths, ("grey", "blue", "orange"), labels, strict=True))
+        curves = [Curve(*np.degrees(path - mean(found.paths[1])).T * 3600, label, color, width=0.8)
+                  for path, color, label in (drawn if case.name == "mercury" else drawn[:2])]  # fmt: skip
+        title = (
+            f"{case.name.title()}, state {case.state}: {np.degrees(found.angle):.4f} deg from the node's pole"
+        )
+        panels.append(Panel(title, "along the node (arcsec)", "across (arcsec)",
+                            [*curves, Curve(0, 0, "", "grey", "+", 3)], equal=True))  # fmt: skip
+    title = "Cassini's states: the pole in the frame that turns with the orbit's node"
+    return Picture(title, "ab", panels, (11.5, 5.6))
+
+
 @Study
 def study(full: bool) -> Answer:
     """Both states against theory, the full model and what was observed."""
@@ -312,24 +329,3 @@ def study(full: bool) -> Answer:
     ]  # fmt: skip
     figure = picture(shown)
     return checks, figure
-
-
-def picture(shown: list[tuple[Case, Found]]) -> Picture:
-    """The pole's path about its state, in the frame of the node."""
-    panels = []
-    for case, found in shown:
-        labels = ("from the balance", "from the state found", "the same by the linear theory")
-        drawn = list(zip(found.paths, ("grey", "blue", "orange"), labels, strict=True))
-        curves = [Curve(*np.degrees(path - mean(found.paths[1])).T * 3600, label, color, width=0.8)
-                  for path, color, label in (drawn if case.name == "mercury" else drawn[:2])]  # fmt: skip
-        title = (
-            f"{case.name.title()}, state {case.state}: {np.degrees(found.angle):.4f} deg from the node's pole"
-        )
-        panels.append(Panel(title, "along the node (arcsec)", "across (arcsec)",
-                            [*curves, Curve(0, 0, "", "grey", "+", 3)], equal=True))  # fmt: skip
-    title = "Cassini's states: the pole in the frame that turns with the orbit's node"
-    return Picture(title, "ab", panels, (11.5, 5.6))
-
-
-if __name__ == "__main__":
-    raise SystemExit(study.main())

@@ -12,17 +12,14 @@ rates is as large as the true one, so that the convention is right or makes no d
 integration is called a wrong model, no wrong model an integration error or agreement.
 
 Run: python -m experiments.compare_conventions [--files N] [--models N] [--seed N] [--no-rates] [--mixed N]
-
-Exit: 1 if one fails
+Exit code 1 if one fails.
 """
 
 from __future__ import annotations
 
-import argparse
 import random
-import sys
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -31,6 +28,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import rigidsim
+from experiments.common import Command
 from rigidsim.workflows.compare.result import Comparison
 
 SEQUENCES = ["zxz", "zyz", "xyx", "xzx", "yxy", "yzy", "zyx", "xyz", "xzy", "yxz", "yzx", "zxy"]
@@ -316,71 +314,58 @@ def a_mixed_file(seed: object) -> Mixed:
     )
 
 
-def mixed_campaign(count: int, seed: int, told: Callable[[str], None] = print) -> int:
+def counted(seen: Counter[str]) -> str:
+    """Verdicts, and how often they were given."""
+    return ", ".join(f"{verdict} {n}" for verdict, n in sorted(seen.items()))
+
+
+def mixed_campaign(count: int, seed: int) -> int:
     """Judge so many mixed files, and print the table; the number of false verdicts."""
     made = []
     for number in range(count):
         one = a_mixed_file(f"{seed} {number}")
         made.append(one)
         if one.wrong or (one.found.verdict == "undecided" and one.widest <= NEAR):
-            told(
+            print(
                 f"{number}: {one.wrong or 'undecided'}: {one.label} {one.way} rates {one.rates} uneven "
                 f"{one.uneven}, {len(one.found.dataset.time)} rows, {one.widest:.0f} deg, true error "
                 f"{one.error:.2g}, {one.found.attitude_error.largest:.2g} found: {one.found.why}"
             )
     for name in (*TRUTHS, *WAYS):
         some = [x for x in made if (x.way or x.truth) == name]
-        seen = Counter(x.found.verdict for x in some)
-        told(
-            f"{name:12} {len(some):4}  " + ", ".join(f"{verdict} {n}" for verdict, n in sorted(seen.items()))
-        )
+        print(f"{name:12} {len(some):4}  {counted(Counter(x.found.verdict for x in some))}")
     near = [x for x in made if x.widest <= NEAR]
     undecided = sum(x.found.verdict == "undecided" for x in near)
-    told(f"{undecided} undecided of {len(near)} files with rows at most {NEAR:g} deg apart")
-    told(", ".join(f"{n} {what}" for what, n in Counter(x.wrong or "right" for x in made).items()))
+    print(f"{undecided} undecided of {len(near)} files with rows at most {NEAR:g} deg apart")
+    print(", ".join(f"{n} {what}" for what, n in Counter(x.wrong or "right" for x in made).items()))
     return sum(bool(x.wrong) for x in made)
 
 
-def campaign(
-    files: int, models: int, seed: int, told: Callable[[str], None] = print, rates: bool = True
-) -> int:
-    """Judge so many files and other models; the number of failures."""
+@Command
+def campaign(files: int = 24, models: int = 16, seed: int = 1, no_rates: bool = False, mixed: int = 0) -> int:
+    """Judge so many files and other models, or mixed files instead; 1 if something failed."""
+    if mixed:
+        return int(bool(mixed_campaign(mixed, seed)))
     failures = 0
     for what, judge, count in (("files", a_file, files), ("other models", a_model, models)):
         seen: Counter[str] = Counter()
         shares: list[float] = []
         for number in range(count):
-            found, wrong = judge(
-                random.Random(f"{seed} {what} {number}"), CONVENTIONS[number % len(CONVENTIONS)], rates
+            chance, convention = (
+                random.Random(f"{seed} {what} {number}"),
+                CONVENTIONS[number % len(CONVENTIONS)],
             )
+            found, wrong = judge(chance, convention, not no_rates)
             seen[found.verdict] += 1
             local = found.local_defects
             if found.verdict != "agrees" and local is not None and local.unexplained is not None:
                 shares.append(local.unexplained)
             if wrong:
                 failures += 1
-                told(f"{what} {number}: {wrong}")
-        told(f"{count} {what}: " + ", ".join(f"{verdict} {n}" for verdict, n in sorted(seen.items())))
+                print(f"{what} {number}: {wrong}")
+        print(f"{count} {what}: {counted(seen)}")
         if shares:
             quantiles = ", ".join(f"{x:.2g}" for x in np.quantile(shares, QUANTILES))
-            told(f"  shares of {len(shares)}, by quantiles {', '.join(map(str, QUANTILES))}: {quantiles}")
-    told(f"{failures} failures")
-    return failures
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Command line; 1 if something failed."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--files", type=int, default=24, help="of other integrators")
-    parser.add_argument("--models", type=int, default=16, help="that are others")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--no-rates", action="store_true", help="files have attitudes alone")
-    parser.add_argument("--mixed", type=int, default=0, help="files of all kinds, instead")
-    given = parser.parse_args(arguments)
-    if given.mixed:
-        return 1 if mixed_campaign(given.mixed, given.seed) else 0
-    return 1 if campaign(given.files, given.models, given.seed, rates=not given.no_rates) else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+            print(f"  shares of {len(shares)}, by quantiles {', '.join(map(str, QUANTILES))}: {quantiles}")
+    print(f"{failures} failures")
+    return int(failures > 0)

@@ -221,32 +221,6 @@ def campaign(count: int) -> tuple[list[Check], np.ndarray, int]:
     return checks, found, refused
 
 
-@Study
-def study(full: bool) -> Answer:
-    """All of it; see the module's text."""
-    size, end = (2.5e-5, 5e4) if full else (2.5e-4, 5e3)
-    scenes = {
-        "tumbler": tumbler(size, end),
-        "with a gradient": tumbler(size, end, GRADIENT.format(square=4e-5, e=0.1, tilt=20)),
-    }
-    checks: list[Check] = []
-    runs: dict[str, dict[str, Result]] = {}
-    for title, scene in scenes.items():
-        found = runs[title] = {level: scene.run(level) for level in ("full", "spin_averaged")}
-        for level, result in found.items():
-            cpu = result.summary["cost"]["cpu_by_phase"]["integrate_and_record"]
-            print(f"{title}, {level}: {result.steps:,d} steps, {cpu:.3g} s", file=sys.stderr)
-        checks += covered(title, found["spin_averaged"], found["full"])
-    checks += wobbles(scenes["tumbler"], runs["tumbler"]["spin_averaged"], runs["tumbler"]["full"])
-    checks.append(axisymmetric())
-    sizes = 2e-3 / 2.0 ** np.arange(8 if full else 5)
-    slopes, errors = orders(sizes)
-    rows, ratios, refused = campaign(40 if full else 10)
-    print(f"random bodies: {refused} refused", file=sys.stderr)
-    figure = picture(scenes["tumbler"], runs["tumbler"], (sizes, errors), ratios)
-    return checks + slopes + rows, figure
-
-
 def picture(
     scene: Scene,
     both: dict[str, Result],
@@ -281,5 +255,27 @@ def picture(
     ], (11.5, 8.2))  # fmt: skip
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool) -> Answer:
+    """All of it; see the module's text."""
+    size, end = (2.5e-5, 5e4) if full else (2.5e-4, 5e3)
+    scenes = {
+        "tumbler": tumbler(size, end),
+        "with a gradient": tumbler(size, end, GRADIENT.format(square=4e-5, e=0.1, tilt=20)),
+    }
+    checks: list[Check] = []
+    runs: dict[str, dict[str, Result]] = {}
+    for title, scene in scenes.items():
+        found = runs[title] = {level: scene.run(level) for level in ("full", "spin_averaged")}
+        for level, result in found.items():
+            cpu = result.summary["cost"]["cpu_by_phase"]["integrate_and_record"]
+            print(f"{title}, {level}: {result.steps:,d} steps, {cpu:.3g} s", file=sys.stderr)
+        checks += covered(title, found["spin_averaged"], found["full"])
+    checks += wobbles(scenes["tumbler"], runs["tumbler"]["spin_averaged"], runs["tumbler"]["full"])
+    checks.append(axisymmetric())
+    sizes = 2e-3 / 2.0 ** np.arange(8 if full else 5)
+    slopes, errors = orders(sizes)
+    rows, ratios, refused = campaign(40 if full else 10)
+    print(f"random bodies: {refused} refused", file=sys.stderr)
+    figure = picture(scenes["tumbler"], runs["tumbler"], (sizes, errors), ratios)
+    return checks + slopes + rows, figure

@@ -164,6 +164,20 @@ def sun_alone() -> Check:
     return Check(name, share, 0.0, 0.01, "1", "a hundredth, as asked", "absolute")
 
 
+def picture(fixed: Result, years: np.ndarray, tilt: np.ndarray) -> Picture:
+    """Obliquity along time, and the orbit's plane."""
+    still = obliquity(fixed.values("momentum_axis"), np.array([[0.0, 0.0, 1.0]]))
+    title = "The Earth over a million years: obliquity on a fixed and on its moving orbit"
+    return Picture(title, "a;b", [
+        Panel("", "", "obliquity (deg)", [
+            Curve(years / 1000, tilt, "moving orbit"),
+            Curve(fixed.values("time") / YEAR / 1000, np.degrees(still), "fixed orbit", "orange"),
+        ], legend="upper center"),
+        Panel("", "time from J2000 (kyr)", "orbit's inclination (deg)",
+              [Curve(years / 1000, columns()[: len(years), 2], "", "grey")]),
+    ], (11.5, 5.6))  # fmt: skip
+
+
 @Study
 def study(full: bool) -> Answer:
     """Both orbits, and the Sun alone; see the module's text."""
@@ -199,21 +213,3 @@ def study(full: bool) -> Answer:
     ]  # fmt: skip
     figure = picture(fixed, years, tilt)
     return checks, figure
-
-
-def picture(fixed: Result, years: np.ndarray, tilt: np.ndarray) -> Picture:
-    """Obliquity along time, and the orbit's plane."""
-    still = obliquity(fixed.values("momentum_axis"), np.array([[0.0, 0.0, 1.0]]))
-    title = "The Earth over a million years: obliquity on a fixed and on its moving orbit"
-    return Picture(title, "a;b", [
-        Panel("", "", "obliquity (deg)", [
-            Curve(years / 1000, tilt, "moving orbit"),
-            Curve(fixed.values("time") / YEAR / 1000, np.degrees(still), "fixed orbit", "orange"),
-        ], legend="upper center"),
-        Panel("", "time from J2000 (kyr)", "orbit's inclination (deg)",
-              [Curve(years / 1000, columns()[: len(years), 2], "", "grey")]),
-    ], (11.5, 5.6))  # fmt: skip
-
-
-if __name__ == "__main__":
-    raise SystemExit(study.main())

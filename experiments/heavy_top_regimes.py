@@ -225,18 +225,6 @@ def pendulum_checks(full: bool) -> list[Check]:
     return checks
 
 
-@Study
-def study(full: bool) -> Answer:
-    """Every regime; see the module's text."""
-    with mpmath.workdps(40):
-        nutations, paths = nutation_checks(full)
-        precessions = precession_checks(full)
-        sleepers, tilts = sleeping_checks()
-        pendulums = pendulum_checks(full)
-        figure = picture(paths, tilts)
-        return nutations + precessions + sleepers + pendulums, figure
-
-
 def picture(paths: dict[str, Result], tilts: dict[str, Result]) -> Picture:
     """Tilts against time: with the closed form's turning angles, and near the sleeping threshold."""
     curves = []
@@ -257,5 +245,13 @@ def picture(paths: dict[str, Result], tilts: dict[str, Result]) -> Picture:
     ], (12, 5))  # fmt: skip
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool) -> Answer:
+    """Every regime; see the module's text."""
+    with mpmath.workdps(40):
+        nutations, paths = nutation_checks(full)
+        precessions = precession_checks(full)
+        sleepers, tilts = sleeping_checks()
+        pendulums = pendulum_checks(full)
+        figure = picture(paths, tilts)
+        return nutations + precessions + sleepers + pendulums, figure

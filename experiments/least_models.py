@@ -10,17 +10,15 @@ Checked for each scene: the named model is within the error; no model within it 
 effects; of the models of which nothing more can be left out within the error, none costs less. Where a model
 with more effects takes so few steps that it costs less by more than 5 %, it has to be told as the cheapest.
 
-Run: python -m experiments.least_models [--count N] [--seed N]      Exit: 1 if a model isn't the least one
+Run: python -m experiments.least_models [--count N] [--seed N]      exit code 1 if a model isn't the least
 """
 
 from __future__ import annotations
 
-import argparse
 import math
 import random
-import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -28,6 +26,7 @@ from typing import Any
 import numpy as np
 
 import rigidsim
+from experiments.common import Command
 from rigidsim.solve.problem import prepare
 from rigidsim.workflows.physics.models import size_of
 
@@ -171,8 +170,9 @@ def faults(error: float, named: frozenset[str], models: dict[frozenset[str], Mod
             yield f"{sorted(kept)} costs {within[kept].cost} instead of {within[named].cost}"
 
 
-def campaign(count: int, seed: int, told: Callable[[str], None] = print) -> tuple[int, int]:
-    """Number of scenes whose named model isn't the least one, and of those where a larger one costs less."""
+@Command
+def campaign(count: int = 30, seed: int = 1) -> int:
+    """Count scenes whose named model isn't the least one, and those where a larger one costs less."""
     wrong = cheaper = 0
     for number in range(count):
         chance = random.Random(f"{seed} {number}")
@@ -190,25 +190,12 @@ def campaign(count: int, seed: int, told: Callable[[str], None] = print) -> tupl
         found += [f"one costs {m.cost} instead of {told_cost}" for m in less if m.cost < _CHEAPER * told_cost]
         wrong, cheaper = wrong + bool(found), cheaper + bool(less)
         share = max((1 - m.cost / models[named].cost for m in less), default=0.0)
-        told(
+        print(
             f"{number:3} {len(models):3} models, {len(plan.tried):3} run beside those of one effect; within "
             f"{error:9.4g} arcsec {len(named)} of {len(scene.effects)} effects; "
             + (f"a larger model costs {share:.1%} less; " if less else "")
-            + ("; ".join(found) or "the least")
+            + ("; ".join(found) or "the least"),
+            flush=True,
         )
-    return wrong, cheaper
-
-
-def main() -> int:
-    """Run the campaign."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--count", type=int, default=30)
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
-    wrong, cheaper = campaign(given.count, given.seed, lambda text: print(text, flush=True))
-    print(f"{wrong} of {given.count} named models aren't the least; in {cheaper} a larger one costs less")
-    return 1 if wrong else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    print(f"{wrong} of {count} named models aren't the least; in {cheaper} a larger one costs less")
+    return int(wrong > 0)

@@ -228,7 +228,3 @@ def long_horizon(full: bool) -> Answer:
                 measured.append(measure(body, precision, held, horizon))
     print(markdown(measured))
     return checks(measured), picture(measured)
-
-
-if __name__ == "__main__":
-    raise SystemExit(long_horizon.main())

@@ -13,13 +13,12 @@ isn't installed is left out with a message.
 Run: python -m experiments.peer_comparison [--repeats 3] [--full] [--peers heyoka,rigidsim,...]
 """
 
-import argparse
 import statistics
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.common import BLUE, DEFAULT_OUT, GREY, RED, new_figure, save, tidy
+from experiments.common import BLUE, DEFAULT_OUT, GREY, RED, Command, chosen, new_figure, save, tidy
 from experiments.peers import ADAPTERS
 from experiments.peers.campaign import BARE, OURS, Measured, measure
 from experiments.peers.curves import Point, cost_at, frontier
@@ -143,48 +142,31 @@ def _curves(panel: Any, points: list[Point], peer: str, handles: dict[str, Any])
             handles.setdefault(title, handle)
 
 
-def arguments_of(argv: Sequence[str] | None) -> argparse.Namespace:
-    """The command line."""
-    parser = argparse.ArgumentParser(
-        prog=f"python -m experiments.{NAME}", description=__doc__.splitlines()[0]
-    )
-    parser.add_argument("--out", type=Path, default=DEFAULT_OUT, help="folder of the figure")
-    parser.add_argument("--repeats", type=int, default=3, help="fresh processes per peer")
-    parser.add_argument("--full", action="store_true", help="every setting; else every third")
-    parser.add_argument("--short", action="store_true", help="short horizons alone")
-    parser.add_argument("--scenes", default=",".join(SCENES), help="default: %(default)s")
-    parser.add_argument("--peers", default=",".join(ADAPTERS), help="default: %(default)s")
-    parser.add_argument("--cap", type=float, default=10.0, help="CPU seconds after which a curve ends")
-    arguments = parser.parse_args(argv)
-    for option, known in (("peers", ADAPTERS), ("scenes", SCENES)):
-        chosen = getattr(arguments, option).split(",")
-        wrong = [name for name in chosen if name not in known]
-        if wrong:
-            parser.error(f"--{option}: given {', '.join(wrong)}; known: {', '.join(known)}")
-        setattr(arguments, option, chosen)
-    return arguments
+@Command
+def campaign(
+    out: Path = DEFAULT_OUT,
+    repeats: int = 3,
+    full: bool = False,
+    short: bool = False,
+    scenes: str = "",
+    peers: str = "",
+    cap: float = 10.0,
+) -> int:
+    """Measure, print the tables, draw the figure; 1 if the bare script itself could not be measured.
 
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Measure, print the tables, draw the figure; 1 if the bare script itself could not be measured."""
-    arguments = arguments_of(argv)
-    ends = 1 if arguments.short else 2
-    cases = [(name, end) for name in arguments.scenes for end in SCENES[name].ends[:ends]]
-    measured = measure(
-        arguments.peers,
-        cases,
-        repeats=arguments.repeats,
-        stride=1 if arguments.full else 3,
-        fill=0.05,
-        cap=arguments.cap,
-    )
+    Args:
+        repeats: fresh processes per peer.
+        full: every setting; else every third.
+        short: short horizons alone.
+        scenes, peers: names, all by default.
+        cap: CPU seconds after which a curve ends.
+    """
+    asked = chosen(peers, ADAPTERS)
+    cases = [(name, end) for name in chosen(scenes, SCENES) for end in SCENES[name].ends[: 1 if short else 2]]
+    measured = measure(asked, cases, repeats=repeats, stride=1 if full else 3, fill=0.05, cap=cap)
     print("\n".join([*rows(measured, cases), "", *settings(measured, cases), ""]))
     for peer, seconds in measured.imports.items():
         print(f"import of {peer}: {statistics.median(seconds):.2f} CPU s")
     print("\n".join(measured.notes))
-    print(f"figure: {draw(measured, cases, arguments.out)}")
-    return int(BARE in arguments.peers and BARE not in measured.imports)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+    print(f"figure: {draw(measured, cases, out)}")
+    return int(BARE in asked and BARE not in measured.imports)

@@ -62,6 +62,28 @@ def vesta(polar: float = 0.4) -> tuple[Result, float, float, float]:
     return result, float(node[1]) * YEAR / MAS / 1000, float(tilt[0]), math.hypot(*tilt[5:7]) / MAS
 
 
+def picture(moon: Result, rock: Result, swing: float, nutation: float) -> Picture:
+    """Phobos towards Mars and about its mean rotation; Vesta's obliquity and node."""
+    days = moon.values("time")[:401] / DAY
+    facing = -np.degrees(moon.values("libration")[:401, 0])  # counted as the rotation, like the other one
+    years = rock.values("time") / DAY / YEAR
+    nodding = []
+    for name, color, label in (("obliquity", "blue", "obliquity"),
+                               ("node_longitude", "orange", "node less its precession")):  # fmt: skip
+        values = rock.dataset[name].sel(axis="figure").values
+        rest = values - np.polyval(np.polyfit(years, values, 1), years)
+        nodding.append(Curve(years, rest / MAS / 1000, label, color))
+    title = "Phobos rocks by 1.1 degrees in each orbit, Vesta nods by 2 arcsec twice a year"
+    return Picture(title, "ab", [
+        Panel(f"Phobos: {abs(swing):.2f}° of its own, the rest is optical", "hours", "deg", [
+            Curve(days * 24, facing, "long axis from the direction of Mars"),
+            Curve(days * 24, swing * np.sin(ANOMALISTIC * days), "from uniform rotation", "red"),
+        ], limits={"ylim": (-3.4, 4.6)}, legend="upper right"),
+        Panel(f"Vesta: {nutation / 1000:.2f} arcsec in obliquity, twice in 3.6 years", "years", "arcsec",
+              nodding, limits={"ylim": (-6.5, 9)}, legend="upper right"),
+    ], (13, 5.0))  # fmt: skip
+
+
 @Study
 def study(full: bool) -> Answer:
     """Both bodies."""
@@ -91,29 +113,3 @@ def study(full: bool) -> Answer:
         Check("Vesta's precession by the formula", rate, secular, 0.001, "arcsec/yr",
               "average; the nutations' squares, and that 22 years are no whole number of cycles"),
     ], figure  # fmt: skip
-
-
-def picture(moon: Result, rock: Result, swing: float, nutation: float) -> Picture:
-    """Phobos towards Mars and about its mean rotation; Vesta's obliquity and node."""
-    days = moon.values("time")[:401] / DAY
-    facing = -np.degrees(moon.values("libration")[:401, 0])  # counted as the rotation, like the other one
-    years = rock.values("time") / DAY / YEAR
-    nodding = []
-    for name, color, label in (("obliquity", "blue", "obliquity"),
-                               ("node_longitude", "orange", "node less its precession")):  # fmt: skip
-        values = rock.dataset[name].sel(axis="figure").values
-        rest = values - np.polyval(np.polyfit(years, values, 1), years)
-        nodding.append(Curve(years, rest / MAS / 1000, label, color))
-    title = "Phobos rocks by 1.1 degrees in each orbit, Vesta nods by 2 arcsec twice a year"
-    return Picture(title, "ab", [
-        Panel(f"Phobos: {abs(swing):.2f}° of its own, the rest is optical", "hours", "deg", [
-            Curve(days * 24, facing, "long axis from the direction of Mars"),
-            Curve(days * 24, swing * np.sin(ANOMALISTIC * days), "from uniform rotation", "red"),
-        ], limits={"ylim": (-3.4, 4.6)}, legend="upper right"),
-        Panel(f"Vesta: {nutation / 1000:.2f} arcsec in obliquity, twice in 3.6 years", "years", "arcsec",
-              nodding, limits={"ylim": (-6.5, 9)}, legend="upper right"),
-    ], (13, 5.0))  # fmt: skip
-
-
-if __name__ == "__main__":
-    raise SystemExit(study.main())

@@ -106,21 +106,6 @@ def period(name: str) -> float:
     }[name]  # fmt: skip
 
 
-@Study
-def study(full: bool) -> Answer:
-    """Daily, every 20 days, and each half synodic month."""
-    daily = simulate(config(200, "1" if full else "4")).dataset
-    found = rigidsim.analyse(daily, lines=30)
-    thin = rigidsim.analyse(daily.isel(time=slice(None, None, 20 if full else 5)), lines=30)
-    synodic = 1 / (1 / mpmath.mpf(SIDEREAL_MONTH) - 1 / mpmath.mpf(SIDEREAL_YEAR))
-    folded = simulate(config(60, mpmath.nstr(synodic / 2, 20))).dataset
-    blind = rigidsim.analyse(folded, ["node_longitude.figure"], lines=12)
-    checks = precession(found) + nutation(found) + unfolding(found, thin, blind)
-    print(listing(found), file=sys.stderr)
-    figure = picture(found, thin)
-    return checks, figure
-
-
 def precession(found: Any) -> list[Check]:
     """The secular rate, and what its error claims."""
     signal = found["node_longitude.figure"]
@@ -247,5 +232,16 @@ def picture(found: Any, thin: Any) -> Picture:
     return Picture(title, "a;b", panels, (12, 7.4))
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool) -> Answer:
+    """Daily, every 20 days, and each half synodic month."""
+    daily = simulate(config(200, "1" if full else "4")).dataset
+    found = rigidsim.analyse(daily, lines=30)
+    thin = rigidsim.analyse(daily.isel(time=slice(None, None, 20 if full else 5)), lines=30)
+    synodic = 1 / (1 / mpmath.mpf(SIDEREAL_MONTH) - 1 / mpmath.mpf(SIDEREAL_YEAR))
+    folded = simulate(config(60, mpmath.nstr(synodic / 2, 20))).dataset
+    blind = rigidsim.analyse(folded, ["node_longitude.figure"], lines=12)
+    checks = precession(found) + nutation(found) + unfolding(found, thin, blind)
+    print(listing(found), file=sys.stderr)
+    figure = picture(found, thin)
+    return checks, figure

@@ -44,20 +44,6 @@ def fitted(result: Result) -> nutation.Nutations:
     return nutation.fit(dates, result.values("figure_axis"), 1 / (1 - H))
 
 
-@Study
-def study(full: bool) -> Answer:
-    """Five amplitudes at three levels."""
-    runs = [run(level) for level in range(len(LEVELS))]
-    fits = [fitted(result) for result in runs]
-    figure = picture(runs[-1], fits[-1])
-    return [
-        Check(f"{line}, {name}", fit.amplitude(line), published, 0.5, "mas",
-              "rigid-Earth series; lines that 50 years can't tell apart", "absolute")
-        for name, fit in zip(LEVELS, fits, strict=True)
-        for line, (_, _, published) in nutation.PUBLISHED.items()
-    ], figure  # fmt: skip
-
-
 def picture(result: Result, fit: nutation.Nutations) -> Picture:
     """The pole's nutation about the mean pole of date, and what the fit leaves."""
     dates = START + result.values("time") / DAY
@@ -75,5 +61,15 @@ def picture(result: Result, fit: nutation.Nutations) -> Picture:
     ])  # fmt: skip
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool) -> Answer:
+    """Five amplitudes at three levels."""
+    runs = [run(level) for level in range(len(LEVELS))]
+    fits = [fitted(result) for result in runs]
+    figure = picture(runs[-1], fits[-1])
+    return [
+        Check(f"{line}, {name}", fit.amplitude(line), published, 0.5, "mas",
+              "rigid-Earth series; lines that 50 years can't tell apart", "absolute")
+        for name, fit in zip(LEVELS, fits, strict=True)
+        for line, (_, _, published) in nutation.PUBLISHED.items()
+    ], figure  # fmt: skip

@@ -15,16 +15,13 @@ estimates.
 Run: python -m experiments.satellite_cost [--turns 5] [--hours 24]      exit code 1 if the motions differ
 """
 
-import argparse
 import sys
-from collections.abc import Sequence
 
 import numpy as np
 
 from experiments.bare import satellite as bare
-from experiments.common import Result, simulate
+from experiments.common import Command, Result, simulate
 
-NAME = "satellite_cost"
 APART = 1e-9
 _QUIET = ("output.estimate=false",)
 
@@ -49,7 +46,7 @@ def scene(hours: float = 24.0, *, plates: bool = True, shadow: bool = True) -> s
     ball = f"[[body.surfaces]]\nradius = {bare.BALL}"
     held = f"position = {list(bare.PLACE)}\n{outside}"
     surfaces = "\n".join([box, panel, held] if plates else [ball, held])
-    return f"""name = "{NAME}"
+    return f"""name = "satellite_cost"
 [body]
 principal_moments = {list(bare.MOMENTS)}
 mass = {bare.MASS}
@@ -112,21 +109,18 @@ def apart(ours: Result, theirs: dict[str, np.ndarray]) -> dict[str, float]:
     return found
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """The command; returns its exit code."""
-    parser = argparse.ArgumentParser(prog=f"python -m experiments.{NAME}")
-    parser.add_argument("--turns", type=int, default=5)
-    parser.add_argument("--hours", type=float, default=24.0)
-    arguments = parser.parse_args(argv)
+@Command
+def campaign(turns: int = 5, hours: float = 24.0) -> int:
+    """Print the table; 1 if the motions differ."""
     print("| | CPU, s | of the script, s | ratio | steps | of the script | ratio |")
     print("| --- " * 7 + "|")
     largest = 0.0
     for name, (plates, shadow) in CASES.items():
         script, ours, theirs = bare.Satellite(plates=plates, shadow=shadow), [], []
-        for _ in range(arguments.turns):
-            run = simulate(scene(arguments.hours, plates=plates, shadow=shadow), *_QUIET)
+        for _ in range(turns):
+            run = simulate(scene(hours, plates=plates, shadow=shadow), *_QUIET)
             ours.append(run.summary["cost"]["cpu_by_phase"]["integrate_and_record"])
-            found = script.integrate(arguments.hours)
+            found = script.integrate(hours)
             theirs.append(found["seconds"])
         seconds, steps = (min(ours), min(theirs)), (run.steps, found["steps"])
         cells = [f"{x:.4g} | {y:.4g} | {x / y:.3g}" for x, y in (seconds, steps)]
@@ -135,7 +129,3 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("apart by " + ", ".join(f"{gap:.1e} ({key})" for key, gap in gaps.items()), file=sys.stderr)
         largest = max(largest, *gaps.values())
     return int(not largest < APART)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

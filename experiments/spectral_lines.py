@@ -191,30 +191,6 @@ def librations() -> list[Check]:
     ]
 
 
-@Study
-def study(full: bool) -> Answer:
-    """All scenes."""
-    checks = []
-    with mpmath.workdps(50):
-        cases = [
-            free("free body", ["3", "2", "1"], ["0.3", "0.2", "1"], "", 7.382),
-            free("Toutatis", ["3.09", "3.22", "1"], ["20.7", "31.3", "98.0"], "deg/day", 9.472),
-            top(),
-        ]
-        drawn = []
-        for case in cases:
-            analysis = case.analysis("double", ["angular_velocity", "figure_axis"])
-            checks += checks_of(case, analysis, 1e-14, "double")
-            drawn.append((case, analysis))
-        if full:
-            for case in cases:
-                analysis = case.analysis("quadruple", ["angular_velocity"])
-                checks += checks_of(case, analysis, 1e-28, "quadruple")
-    checks += librations()
-    figure = picture(drawn)
-    return checks, figure
-
-
 def picture(drawn: list[tuple[Case, Any]]) -> Picture:
     """The lines of the rates across the figure axis, down to 1e-12 of the largest."""
 
@@ -240,5 +216,25 @@ def picture(drawn: list[tuple[Case, Any]]) -> Picture:
     return Picture(title, "a;b;c", [panel(*one) for one in drawn], (12, 8.4))
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool) -> Answer:
+    """All scenes."""
+    checks = []
+    with mpmath.workdps(50):
+        cases = [
+            free("free body", ["3", "2", "1"], ["0.3", "0.2", "1"], "", 7.382),
+            free("Toutatis", ["3.09", "3.22", "1"], ["20.7", "31.3", "98.0"], "deg/day", 9.472),
+            top(),
+        ]
+        drawn = []
+        for case in cases:
+            analysis = case.analysis("double", ["angular_velocity", "figure_axis"])
+            checks += checks_of(case, analysis, 1e-14, "double")
+            drawn.append((case, analysis))
+        if full:
+            for case in cases:
+                analysis = case.analysis("quadruple", ["angular_velocity"])
+                checks += checks_of(case, analysis, 1e-28, "quadruple")
+    checks += librations()
+    figure = picture(drawn)
+    return checks, figure

@@ -115,21 +115,6 @@ def _way(mine: np.ndarray, there: list[mpmath.mpf]) -> float:
         return float(mpmath.norm([float(a) - b for a, b in zip(mine, there, strict=True)]))
 
 
-@Study
-def study(full: bool, members: int = 0, seed: int = _SEED, only: str = "") -> Answer:
-    """All kinds, or some members of the cheap ones; the figure, the checks."""
-    members = members or (_MEMBERS if full else _FEW_MEMBERS)
-    told: list[tuple[str, Found]] = []
-    print(
-        "kind                      members  >3x  >10x unwarned  worst  median announced/true  gone  CPU ratio"
-    )
-    for kind in only.split() or (KINDS if full else _CHEAP):
-        for what, found in found_of(kind, members, seed):
-            print(line(kind, what, found), flush=True)
-            told.append((what, found))
-    return judged([found for what, found in told if what == "attitude"]), picture(told)
-
-
 def picture(told: Sequence[tuple[str, Found]]) -> Picture:
     """True errors over the announced ones, attitudes beside positions."""
     panels = []
@@ -186,5 +171,16 @@ def judged(found: Sequence[Found]) -> list[Check]:
     return [Check(name, float(value), 0, most, "1", asked, "absolute") for name, value, most in rows]
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool, members: int = 0, seed: int = _SEED, only: str = "") -> Answer:
+    """All kinds, or some members of the cheap ones; the figure, the checks."""
+    members = members or (_MEMBERS if full else _FEW_MEMBERS)
+    told: list[tuple[str, Found]] = []
+    print(
+        "kind                      members  >3x  >10x unwarned  worst  median announced/true  gone  CPU ratio"
+    )
+    for kind in only.split() or (KINDS if full else _CHEAP):
+        for what, found in found_of(kind, members, seed):
+            print(line(kind, what, found), flush=True)
+            told.append((what, found))
+    return judged([found for what, found in told if what == "attitude"]), picture(told)

@@ -49,6 +49,23 @@ def long_axis(result: Result) -> tuple[np.ndarray, np.ndarray]:
     return np.arctan2(axis @ np.cross(up, east), axis @ east), np.arccos(axis @ up)
 
 
+def picture(result: Result, rotation: float, precession: float) -> Picture:
+    """The rates, and the azimuth of the long axis less its mean growth."""
+    time, (azimuth, _) = result.values("time") / DAY, long_axis(result)
+    short, w = time <= 30, np.degrees(result.values("angular_velocity")) * DAY
+    growth = np.degrees(np.unwrap(azimuth))
+    uneven = np.sign(growth[-1]) * (growth - growth[0]) - 360 * time / precession
+    colors = ("blue", "grey", "orange")
+    rates = [Curve(time[short], w[short, k], f"w{'xyz'[k]}", colors[k]) for k in range(3)]
+    title = f"Toutatis: {rotation:.3f} days about its long axis, which precesses in {precession:.3f} days"
+    return Picture(title, "a;b", [
+        Panel(f"Body rates: period 4K/p = {rotation:.3f} days", "", "rate (deg/day)", rates),
+        Panel(f"Precession: uneven twice per rotation, on top of 360 deg in {precession:.3f} days",
+              "time (days)", "azimuth less its mean growth (deg)",
+              [Curve(time[short], (uneven - uneven.mean())[short])]),
+    ])  # fmt: skip
+
+
 @Study
 def study(full: bool) -> Answer:
     """Both periods against the paper and the closed form."""
@@ -80,24 +97,3 @@ def study(full: bool) -> Answer:
     ]  # fmt: skip
     figure = picture(result, rotation, precession)
     return checks, figure
-
-
-def picture(result: Result, rotation: float, precession: float) -> Picture:
-    """The rates, and the azimuth of the long axis less its mean growth."""
-    time, (azimuth, _) = result.values("time") / DAY, long_axis(result)
-    short, w = time <= 30, np.degrees(result.values("angular_velocity")) * DAY
-    growth = np.degrees(np.unwrap(azimuth))
-    uneven = np.sign(growth[-1]) * (growth - growth[0]) - 360 * time / precession
-    colors = ("blue", "grey", "orange")
-    rates = [Curve(time[short], w[short, k], f"w{'xyz'[k]}", colors[k]) for k in range(3)]
-    title = f"Toutatis: {rotation:.3f} days about its long axis, which precesses in {precession:.3f} days"
-    return Picture(title, "a;b", [
-        Panel(f"Body rates: period 4K/p = {rotation:.3f} days", "", "rate (deg/day)", rates),
-        Panel(f"Precession: uneven twice per rotation, on top of 360 deg in {precession:.3f} days",
-              "time (days)", "azimuth less its mean growth (deg)",
-              [Curve(time[short], (uneven - uneven.mean())[short])]),
-    ])  # fmt: skip
-
-
-if __name__ == "__main__":
-    raise SystemExit(study.main())

@@ -223,19 +223,6 @@ def asteroid(full: bool, found: dict[str, Result]) -> list[Check]:
     return checks
 
 
-@Study
-def study(full: bool) -> Answer:
-    """Both bodies; see the module's text."""
-    tumbler: dict[str, Result] = {}
-    toutatis: dict[str, Result] = {}
-    orbits = 10000 if full else 200
-    checks = beside(TUMBLER, "tumbler", orbits * TUMBLER.period, 5001, tumbler)
-    checks += kept(tumbler["full"], moments_of(tumbler["full"]))
-    checks += asteroid(full, toutatis)
-    figure = picture(tumbler, toutatis)
-    return checks, figure
-
-
 def picture(tumbler: dict[str, Result], toutatis: dict[str, Result]) -> Picture:
     """Distances from the full motion, and the wobble in it."""
     ways = (("tumbler", tumbler, TUMBLER), ("Toutatis", toutatis, TOUTATIS))
@@ -267,5 +254,14 @@ def picture(tumbler: dict[str, Result], toutatis: dict[str, Result]) -> Picture:
     )
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool) -> Answer:
+    """Both bodies; see the module's text."""
+    tumbler: dict[str, Result] = {}
+    toutatis: dict[str, Result] = {}
+    orbits = 10000 if full else 200
+    checks = beside(TUMBLER, "tumbler", orbits * TUMBLER.period, 5001, tumbler)
+    checks += kept(tumbler["full"], moments_of(tumbler["full"]))
+    checks += asteroid(full, toutatis)
+    figure = picture(tumbler, toutatis)
+    return checks, figure

@@ -71,37 +71,6 @@ def told(level: Level, result: Result) -> None:
     print(f"{level.label:32s} {result.steps:12,d} steps, integrate and record {cpu:.3g} s", file=sys.stderr)
 
 
-@Study
-def study(full: bool) -> Answer:
-    """All levels beside the full motion; see the module's text."""
-    span = ("25760 yr", "28 yr") if full else ("56 yr", "0.2 yr")
-    resolved = run(FULL, *span)
-    told(FULL, resolved)
-    results = {level: run(level, *span) for level in AVERAGED}
-    checks = []
-    for level, result in results.items():
-        told(level, result)
-        for name, words in SHOWN.items():
-            largest = float(np.abs(apart(result, resolved, name)).max())
-            if level.bound is None:
-                print(f"{level.label:32s} {words}: at most {largest:.2g} rad apart", file=sys.stderr)
-                continue
-            title = f"{level.label}: {words}, from the full motion"
-            source = "what was asked, over the whole cycle"
-            checks.append(Check(title, largest, 0.0, level.bound, "rad", source, "absolute"))
-        if level.bound is not None:
-            axes = ("momentum_axis", "figure_axis")
-            ratio = max(
-                float(np.linalg.norm(apart(result, resolved, axis), axis=1).max())
-                / float(result.summary["modelling"][axis])
-                for axis in axes
-            )
-            title = f"{level.label}: axes from the full motion's, over what is announced"
-            checks.append(Check(title, ratio, 0.0, 1.0, "1", "summary.json, modelling", "absolute"))
-    figure = picture(resolved, results)
-    return [*checks, integrated(40 if full else 4)], figure
-
-
 def integrated(years: int) -> Check:
     """Under a Sun and a Moon that are integrated: the average from every rotation, over what is announced."""
     levels = (FULL, AVERAGED[0])
@@ -138,5 +107,32 @@ def picture(resolved: Result, results: dict[Level, Result]) -> Picture:
     ], (11.5, 5.2))  # fmt: skip
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool) -> Answer:
+    """All levels beside the full motion; see the module's text."""
+    span = ("25760 yr", "28 yr") if full else ("56 yr", "0.2 yr")
+    resolved = run(FULL, *span)
+    told(FULL, resolved)
+    results = {level: run(level, *span) for level in AVERAGED}
+    checks = []
+    for level, result in results.items():
+        told(level, result)
+        for name, words in SHOWN.items():
+            largest = float(np.abs(apart(result, resolved, name)).max())
+            if level.bound is None:
+                print(f"{level.label:32s} {words}: at most {largest:.2g} rad apart", file=sys.stderr)
+                continue
+            title = f"{level.label}: {words}, from the full motion"
+            source = "what was asked, over the whole cycle"
+            checks.append(Check(title, largest, 0.0, level.bound, "rad", source, "absolute"))
+        if level.bound is not None:
+            axes = ("momentum_axis", "figure_axis")
+            ratio = max(
+                float(np.linalg.norm(apart(result, resolved, axis), axis=1).max())
+                / float(result.summary["modelling"][axis])
+                for axis in axes
+            )
+            title = f"{level.label}: axes from the full motion's, over what is announced"
+            checks.append(Check(title, ratio, 0.0, 1.0, "1", "summary.json, modelling", "absolute"))
+    figure = picture(resolved, results)
+    return [*checks, integrated(40 if full else 4)], figure
