@@ -19,7 +19,6 @@ from experiments.common import DEFAULT_OUT, Check, table
 
 STUDIES = (
     "earth_free_nutation",
-    "toutatis",
     "heavy_top_regimes",
     "flip_period",
     "precession_and_nutation",

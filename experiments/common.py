@@ -8,6 +8,7 @@ other kinds have a function under ``@Command``.
 import argparse
 import inspect
 import math
+import sys
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import mpmath
+import numpy as np
 import xarray
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -113,6 +115,24 @@ class Result:
         """Taylor steps taken."""
         return int(self.summary["cost"]["steps"])
 
+    @property
+    def seconds(self) -> float:
+        """CPU of integrating and recording."""
+        return float(self.summary["cost"]["cpu_by_phase"]["integrate_and_record"])
+
+    def told(self, name: str) -> "Result":
+        """Print steps and CPU on stderr."""
+        print(f"{name:40s} {self.steps:12,d} steps, {self.seconds:.3g} s", file=sys.stderr)
+        return self
+
+    def apart(self, other: "Result", name: str = "momentum_axis") -> np.ndarray:
+        """Distances of a vector from another run's, at the samples."""
+        return np.asarray(np.linalg.norm(self.values(name) - other.values(name), axis=1))
+
+    def announced(self, name: str = "momentum_axis") -> float:
+        """How far an averaged run says that a variable may be from the full motion's, until the end."""
+        return float(self.summary["modelling"][name])
+
     def values(self, name: str) -> Any:
         """A variable as a float64 array."""
         return self.dataset[name].values
@@ -154,6 +174,16 @@ def simulate(config: str | Path, *overrides: str) -> Result:
             raise RuntimeError(f"{experiment.config.name}: {run.status}: {run.summary['message']}")
         with run.dataset as dataset:
             return Result(dataset.load(), run.summary)
+
+
+def covered(title: str, distance: np.ndarray, announced: float) -> Check:
+    """An average's largest distance from the full motion over what it announces."""
+    print(f"{title}: {distance.max():.2g} from the full motion, {announced:.2g} announced", file=sys.stderr)
+    name, source = (
+        f"{title} from the full motion's, over what is announced",
+        "summary.json, modelling: at most 1",
+    )
+    return Check(name, float(distance.max()) / announced, 0.5, 0.5, "1", source, "absolute")
 
 
 def round_off(result: Result, rate: float, precision: str = "double") -> float:

@@ -43,7 +43,6 @@ _STYLES = {
     "rigidsim, Euler": (BLUE, ":", "X", 3),
     "numba DOP853": (RED, "-", "o", 3.5),
     "scipy DOP853, numba": (GREY, "-", "s", 3),
-    "scipy DOP853, Python": (GREY, ":", "o", 3),
     "scipy LSODA": (GREY, "--", "^", 3),
     "MuJoCo RK4": ("#a6761d", "-", "o", 3.5),
     "MuJoCo implicit": ("#a6761d", ":", "s", 3),

@@ -113,7 +113,7 @@ def _moved(given: Any, key: Any, step: Fraction) -> list[str]:
                 exact += mpmath.mpf(step.numerator) / step.denominator
                 value = Fraction(int(exact * 10**45), 10**45)
         text = f'"{value.numerator}/{value.denominator}"'
-        return [f"{'.'.join(_written(place))}={text}" for place in key.places]
+        return [f"{place}={text}" for place in key.places]
     with mpmath.workdps(60):
         q = [
             mpmath.mpf(x.rational.numerator) / x.rational.denominator for x in given.config.initial.quaternion
@@ -130,16 +130,6 @@ def _moved(given: Any, key: Any, step: Fraction) -> list[str]:
             a * h + b * g - c * f + d * e,
         ]
         return [f"initial.quaternion={[mpmath.nstr(x, 50) for x in turned]}".replace("'", '"')]
-
-
-def _written(place: tuple[str | int, ...]) -> list[str]:
-    parts: list[str] = []
-    for step in place:
-        if isinstance(step, int):
-            parts[-1] += f"[{step}]"
-        else:
-            parts.append(step)
-    return parts
 
 
 def _whole(dataset: Any, name: str) -> np.ndarray:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments.benchmarking.processes import BARE, Figures, told, whole
+from experiments.benchmarking.processes import SCRIPT, Figures, told, whole
 
 CONFIG = """name = "benchmark"
 [body]
@@ -106,13 +106,13 @@ class Scene:
 
         return Job(go)
 
-    def script(self, name: str, tolerance: float | None = None) -> Job:
-        """A script of ``experiments/bare``; at heyoka's own tolerance unless another is given."""
+    def script(self, kind: str, tolerance: float | None = None) -> Job:
+        """The script of ``experiments/bare``; at heyoka's own tolerance unless another is given."""
 
         def go(folder: Path, _: bool) -> Figures:
             more = ["extended"] if self.precision == "extended" else []
             more += [] if tolerance is None else [repr(tolerance)]
-            return told([str(BARE / name), str(folder / "bare.h5"), str(self.end), str(self.samples), *more])
+            return told([SCRIPT, kind, str(folder / "bare.h5"), str(self.end), str(self.samples), *more])
 
         return Job(go)
 
@@ -138,25 +138,25 @@ def rows(*, quick: bool) -> list[Row]:
     return [
         Row(
             "sparse", f"free body, {_span(sparse)}", "`propagate_grid` + h5py", 1.03,
-            sparse.run, sparse.script("free_body_sparse.py"),
+            sparse.run, sparse.script("sparse"),
         ),
         Row(
             "dense", f"free body, {_span(dense)}, default record",
             "script with the same variables, gzip 4 + shuffle", 0.6,
-            dense.run, dense.script("free_body_dense.py"), dataset=True,
+            dense.run, dense.script("dense"), dataset=True,
         ),
         Row(
             "timeline", f"the same with its timeline ({min(shown.samples, 100_000):,} rows)",
             "the same script without one", 0.8,
-            shown.run, dense.script("free_body_dense.py"),
+            shown.run, dense.script("dense"),
         ),
         Row(
             "extended", f"80-bit, {_span(extended)}", "the same script in 80-bit arithmetic", 1.02,
-            extended.run, extended.script("free_body_dense.py"), dataset=True,
+            extended.run, extended.script("dense"), dataset=True,
         ),
         Row(
             "extended_alike", f"80-bit, {_span(extended)}", "that script at the tolerance of rigidsim", 1.02,
-            extended.run, extended.script("free_body_dense.py", _EXTENDED_TOLERANCE), dataset=True,
+            extended.run, extended.script("dense", _EXTENDED_TOLERANCE), dataset=True,
         ),
         Row(
             "memory", f"{many.samples:.0e} samples: peak memory", f"{few.samples:.0e} samples", 1.1,
@@ -173,7 +173,7 @@ def rows(*, quick: bool) -> list[Row]:
         ),
         Row(
             "warm", "tiny scene in a warm process, no files", "bare `taylor_adaptive` + run", 2.0,
-            tiny.warm, Job(lambda folder, estimate: told([str(BARE / "tiny_warm.py"), str(_TIMES)])),
+            tiny.warm, Job(lambda folder, estimate: told([SCRIPT, "warm", str(_TIMES)])),
         ),
     ]  # fmt: skip
 
