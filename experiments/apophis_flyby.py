@@ -263,7 +263,6 @@ def study(full: bool, config: bool = False) -> Answer:
     print(f"  in short-axis mode after the pass: {after.short.mean():.3f}")
     for name, (low, middle, high) in quantiles.items():
         print(f"  {name}: median {middle:.3g}, 5 to 95 % {low:.3g} to {high:.3g}")
-    figure = picture(drawn, after, poles, shift)
     likely = "Benson et al. 2023, abstract; likely: more than half"
     could = "Benson et al. 2023, abstract, to the one digit it has; one in 1000 beyond"
     published, error = PUBLISHED_EXCITATION
@@ -279,4 +278,4 @@ def study(full: bool, config: bool = False) -> Answer:
         Check("place two days after, off Kepler's hyperbola", astray, 0, 1e-9, "1",
               "closed form; the body's size makes (170 m / 38,000 km)^2 = 2e-11", "absolute"),
         Check("largest drift over its bound", max(drifts), 0, 1, "1", "round-off law", "absolute"),
-    ], figure  # fmt: skip
+    ], picture(drawn, after, poles, shift)  # fmt: skip

@@ -132,7 +132,6 @@ def study(full: bool) -> Answer:
     other_rates, other_poles = hyperbolas(drawn)
     after, alone = tumbling_of(drawn.moments, rates), tumbling_of(drawn.moments, other_rates)
     shift, apart = angle(poles, drawn.poles), angle(poles, other_poles)
-    figure = picture(scene, drawn, after, shift, apart)
     likely = "Benson et al. 2023, abstract; likely: more than half"
     none = "none; little beside what isn't known of the rotation"
     return [
@@ -152,4 +151,4 @@ def study(full: bool) -> Answer:
               "absolute"),
         Check("effective rate over that about the Earth alone, median",
               float(np.median(after.effective / alone.effective)), 1.0, 1e-3, "1", none, "absolute"),
-    ], figure  # fmt: skip
+    ], picture(scene, drawn, after, shift, apart)  # fmt: skip

@@ -72,12 +72,9 @@ class Model:
         q, w = y[:4], y[4:]
         torque = -self.load * w if self.kind == "braked" else np.zeros(3)
         if self.kind == "top":  # weight at (0, 0, 1) below a vertical Z: up in body axes times -load
-            x, y_, z = (
-                2 * (q[1] * q[3] - q[0] * q[2]),
-                2 * (q[2] * q[3] + q[0] * q[1]),
-                1 - 2 * (q[1] ** 2 + q[2] ** 2),
-            )
-            torque = -self.load * np.cross([0, 0, 1.0], np.array([x, y_, z]) / (q @ q))
+            across = 2 * (q[1] * q[3] - q[0] * q[2]), 2 * (q[2] * q[3] + q[0] * q[1])
+            up = np.array([*across, 1 - 2 * (q[1] ** 2 + q[2] ** 2)]) / (q @ q)
+            torque = -self.load * np.cross([0, 0, 1.0], up)
         turn = np.array([-q[1:] @ w, *(q[0] * w + np.cross(q[1:], w))]) / 2
         return np.concatenate([turn, (torque - np.cross(w, self.moments * w)) / self.moments])
 
@@ -165,14 +162,23 @@ def judged(model: Model, times: np.ndarray, columns: dict[str, np.ndarray], rate
     return rigidsim.compare(rigidsim.parse(model.config), {"t": times, **kept})
 
 
+def spaced(model: Model, chance: random.Random) -> np.ndarray:
+    """Even rows, near and far apart."""
+    turned = model.end * float(np.linalg.norm(model.rates))
+    return np.linspace(0, model.end, max(8, round(turned / 10 ** chance.uniform(-1.7, 0))))
+
+
+def loose(method: str, chance: random.Random, least: float) -> float:
+    """A step times rate, or a relative tolerance from a power of ten on."""
+    return 10 ** (chance.uniform(-2, -0.7) if method in ("rk4", "heun") else chance.uniform(least, -3))
+
+
 def a_file(chance: random.Random, convention: Any, rates: bool = True) -> tuple[Comparison, str]:
     """Judge the file of a loose or tight integration: the result, and what is wrong; empty for nothing."""
     model = Model.drawn(chance)
     method = chance.choice(METHODS)
-    steps = method in ("rk4", "heun")
-    accuracy = 10 ** (chance.uniform(-2, -0.7) if steps else chance.uniform(-10, -3))
+    accuracy, times = loose(method, chance, -10), spaced(model, chance)
     size = float(np.linalg.norm(model.rates))
-    times = np.linspace(0, model.end, max(8, round(model.end * size / 10 ** chance.uniform(-1.7, 0))))
     rows, exact = model.rows(method, accuracy, times), model.rows("DOP853", 3e-14, times)
     found = judged(model, times, written(convention, rows, chance), rates)
     true = float(angles(rows, exact).max())
@@ -203,8 +209,7 @@ def a_model(chance: random.Random, convention: Any, rates: bool = True) -> tuple
         "missing": lambda: replace(model, load=0.0),
     }[wrong]()
     accuracy = 10 ** chance.uniform(-12, -9)
-    size = float(np.linalg.norm(model.rates))
-    times = np.linspace(0, model.end, max(8, round(model.end * size / 10 ** chance.uniform(-1.7, 0))))
+    times = spaced(model, chance)
     rows = other.rows("DOP853", accuracy, times)
     found = judged(model, times, written(convention, rows, chance), rates)
     if found.verdict in ("integration_error", "agrees"):
@@ -264,17 +269,14 @@ def a_mixed_file(seed: object) -> Mixed:
     other, method, accuracy, label = model, "DOP853", 3e-14, truth
     if truth == "loose":
         method = chance.choice([m for m in METHODS if not uneven or m not in ("rk4", "heun")])
-        steps = method in ("rk4", "heun")
-        accuracy = 10 ** (chance.uniform(-2, -0.7) if steps else chance.uniform(-8, -3))
+        accuracy = loose(method, chance, -8)
         label = f"{method} {accuracy:.0e}"
     if truth == "model":
         change, axis = 10 ** chance.uniform(-4, -0.7), chance.randrange(3)
         other = replace(model, moments=model.moments * (1 + change * np.eye(3)[axis]))
         label = f"moment {axis} {change:+.0e}"
     exact = model.rows("DOP853", 3e-14, times)
-    rows = exact if other is model and method == "DOP853" and accuracy < 1e-13 else other.rows(
-        method, accuracy, times
-    )  # fmt: skip
+    rows = other.rows(method, accuracy, times)
     error = float(angles(rows, exact).max())
     attitude, rates = rows[:, :4], rows[:, 4:]
     way = chance.choice(WAYS) if kind == "contradicting" else ""
@@ -302,16 +304,8 @@ def a_mixed_file(seed: object) -> Mixed:
     columns = {"t": written_times, "q": attitude[:, order]} | ({} if kind == "none" else {"w": rates})
     found = rigidsim.compare(rigidsim.parse(model.config), columns)
     steps = np.linalg.norm(exact[:-1, 4:], axis=1) * np.diff(times)
-    return Mixed(
-        truth,
-        way,
-        kind != "none",
-        uneven,
-        float(np.degrees(steps.max())),
-        error,
-        f"{model.kind} {label}",
-        found,
-    )
+    widest, label = float(np.degrees(steps.max())), f"{model.kind} {label}"
+    return Mixed(truth, way, kind != "none", uneven, widest, error, label, found)
 
 
 def counted(seen: Counter[str]) -> str:

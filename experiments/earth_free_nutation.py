@@ -95,5 +95,4 @@ def study(full: bool, flattening: str = FLATTENING) -> Answer:
         Check("NOT Chandler's period (axes)", days["axes"], sum(CHANDLER) / 2,
               (CHANDLER[1] - CHANDLER[0]) / 2, "days", "as above", "apart"),
     ]  # fmt: skip
-    figure = picture(measured, days)
-    return checks, figure
+    return checks, picture(measured, days)

@@ -23,7 +23,6 @@ from experiments.measure import crossings
 MOMENTS = (1, 2, 3)
 FLIPS = 3
 PER_UNIT = 50  # samples per 1/p
-COLORS = {"double": "orange", "extended": "green", "quadruple": "blue"}
 CONFIG = """
 name = "flips"
 body.principal_moments = [1, 2, 3]

@@ -95,14 +95,8 @@ def nutation(result: Result) -> Nutation:
     turned = value_at(time, phi, lows[-1]) - value_at(time, phi, lows[0])  # over whole nutations
     speed = float(np.linalg.norm(result.values("angular_velocity"), axis=1).max())
     period = float((lows[-1] - lows[0]) / (len(lows) - 1))
-    return Nutation(
-        period,
-        float(low),
-        float(high),
-        len(lows) - 1,
-        float(turned / (lows[-1] - lows[0])),
-        round_off(result, speed),
-    )
+    precession = float(turned / (lows[-1] - lows[0]))
+    return Nutation(period, float(low), float(high), len(lows) - 1, precession, round_off(result, speed))
 
 
 REGIMES = {  # the axis' path: body rates that start at its upper turning point, 30 degrees

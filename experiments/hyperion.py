@@ -321,5 +321,4 @@ def study(full: bool) -> Answer:
             Check(f"Lyapunov rate, {name}, {len(lean)} x {revolutions} revolutions", rate, RATES[name],
                   tolerance, "n", "re-computed (the paper: about 0.1); 15 %, shorter runs 30 %")
         )  # fmt: skip
-    figure = picture(motion, shown, exponents)
-    return checks, figure
+    return checks, picture(motion, shown, exponents)

@@ -119,7 +119,6 @@ def study(full: bool) -> Answer:
     _, fluid = run(f"body.core={{moment={CORE.moment!r}, flattening={CORE.flattening!r}}}")
     core = mars.fit(days, fluid.values("figure_axis"), (FREE, CORE.free_nutation(SPIN)))
     scale = factor(rigid)
-    figure = picture(days, result, rigid, core, scale)
     return [
         Check("precession, with the geodetic one", rigid.rates[0] + mars.GEODETIC, mars.PRECESSION, 0.02,
               "mas/yr", "Konopliv et al. 2016; H is fitted to it, in six digits", "absolute"),
@@ -128,4 +127,4 @@ def study(full: bool) -> Answer:
         Check("precession that the published series goes with", -rigid.rates[0] / scale, 7576.0, 35.0,
               "mas/yr", "Folkner et al. 1997; its error", "absolute"),
         *amplifications(rigid, core),
-    ], figure  # fmt: skip
+    ], picture(days, result, rigid, core, scale)  # fmt: skip

@@ -112,5 +112,4 @@ def study(full: bool) -> Answer:
         Check("the same by the formula", loose.period, free_period(4e-5 / 0.34), 1e-3, "yr",
               "first order; the eccentricity changes"),
     ]  # fmt: skip
-    figure = picture(days, turned, real)
-    return checks, figure
+    return checks, picture(days, turned, real)

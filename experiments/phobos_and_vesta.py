@@ -94,7 +94,6 @@ def study(full: bool) -> Answer:
     h = J2 / 0.4
     secular = -1.5 * ORBIT**2 / SPIN * h * math.cos(tilt) * (1 - FLAT**2) ** -1.5 * YEAR / MAS / 1000
     half = 0.75 * ORBIT / SPIN * h * math.sin(tilt) * (1 - 2.5 * FLAT**2) / MAS
-    figure = picture(moon, rock, swing, nutation)
     abstract = "Rambaux 2013, abstract"
     return [
         Check("Phobos, once in an orbit", -swing, 1.1, 0.05, "deg", "Rambaux et al. 2012; one digit",
@@ -112,4 +111,4 @@ def study(full: bool) -> Answer:
         Check("Vesta, the nutation by the formula", nutation, half, 0.005, "mas", "first order; e^4, n/w"),
         Check("Vesta's precession by the formula", rate, secular, 0.001, "arcsec/yr",
               "average; the nutations' squares, and that 22 years are no whole number of cycles"),
-    ], figure  # fmt: skip
+    ], picture(moon, rock, swing, nutation)  # fmt: skip

@@ -121,38 +121,23 @@ def nutation(found: Any) -> list[Check]:
     """The four largest terms in longitude and obliquity."""
     checks = []
     rigid = "REN-2000 as quoted; perturbations of the orbits are left out"
-    for name, (real_longitude, real_obliquity) in REAL.items():
+    for name, real in REAL.items():
         along, across = (line_of(found, s, name) for s in ("node_longitude.figure", "obliquity.figure"))
-        a, b = float(along.amplitude) / ARCSEC, float(across.amplitude) / ARCSEC
-        checks.append(
-            Check(
-                f"{name}: period",
-                along.period / DAY,
-                period(name),
-                1e-6 if name != "182.6 d" else 1e-5,
-                "d",
-                "the term's argument; lines within a bin",
-            )
-        )
+        sizes = [float(x.amplitude) / ARCSEC for x in (along, across)]
+        source, allowed = "the term's argument; lines within a bin", 1e-6 if name != "182.6 d" else 1e-5
+        checks.append(Check(f"{name}: period", along.period / DAY, period(name), allowed, "d", source))
         if name in RIGID:
-            checks.append(Check(f"{name}: longitude, rigid", a, RIGID[name], 1e-2, "arcsec", rigid))
-        if name in ("182.6 d", "13.66 d"):
-            for what, size, real in (("longitude", a, real_longitude), ("obliquity", b, real_obliquity)):
-                checks.append(
-                    Check(f"{name}: {what}, real Earth", size, real, 0.015 * real, "arcsec",
-                          "IAU 2000B; core and mantle yield", "apart")
-                )  # fmt: skip
-        if name == "9.3 yr":
-            for what, size, real in (("longitude", a, real_longitude), ("obliquity", b, real_obliquity)):
-                checks.append(
-                    Check(f"{name}: {what}", size, real, 1e-2, "arcsec", "IAU 2000B; slow: all alike")
-                )
+            checks.append(Check(f"{name}: longitude, rigid", sizes[0], RIGID[name], 1e-2, "arcsec", rigid))
+        for what, size, published in zip(("longitude", "obliquity"), sizes, real, strict=True):
+            if name in ("182.6 d", "13.66 d"):
+                title, source = f"{name}: {what}, real Earth", "IAU 2000B; core and mantle yield"
+                checks.append(Check(title, size, published, 0.015 * published, "arcsec", source, "apart"))
+            if name == "9.3 yr":
+                source = "IAU 2000B; slow: all alike"
+                checks.append(Check(f"{name}: {what}", size, published, 1e-2, "arcsec", source))
         if name == "18.6 yr":
-            checks.append(
-                Check(
-                    "18.6 yr: obliquity, rigid", b, 9.2022, 5e-3, "arcsec", "first order; what it leaves out"
-                )
-            )
+            source = "first order; what it leaves out"
+            checks.append(Check("18.6 yr: obliquity, rigid", sizes[1], 9.2022, 5e-3, "arcsec", source))
     return checks
 
 
@@ -203,13 +188,9 @@ def picture(found: Any, thin: Any) -> Picture:
             taken: list[tuple[float, float]] = []
             for line in signal.lines:
                 x, y = float(line.frequency) * turns, float(line.amplitude) / ARCSEC
-                color = (
-                    COLORS["red"]
-                    if line.unfolded
-                    else "grey"
-                    if line.ambiguous or not line.label.text
-                    else "blue"
-                )
+                color = COLORS["red"] if line.unfolded else "blue"
+                if line.ambiguous or not line.label.text:
+                    color = "grey"
                 axes.vlines(x, 1e-6, y, color=color, linewidth=1.4)
                 room = all(abs(np.log10(x / a)) > 0.14 or abs(np.log10(y / b)) > 0.9 for a, b in taken)
                 if y > 3e-2 and room:
@@ -243,5 +224,4 @@ def study(full: bool) -> Answer:
     blind = rigidsim.analyse(folded, ["node_longitude.figure"], lines=12)
     checks = precession(found) + nutation(found) + unfolding(found, thin, blind)
     print(listing(found), file=sys.stderr)
-    figure = picture(found, thin)
-    return checks, figure
+    return checks, picture(found, thin)

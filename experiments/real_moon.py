@@ -38,7 +38,7 @@ SPARSE = ("time.every=8 day", "output.record=['quaternion']", "output.estimate=f
 def left_over(result: Result, package: str = "de421") -> np.ndarray:
     """Rotation vectors from the package's librations, mas, body axes."""
     days = result.values("time") / DAY
-    return bare.left_over(package, START, days, result.values("quaternion"))["vectors"]
+    return bare.left_over(package, START, days, result.values("quaternion"))
 
 
 def rms(vectors: np.ndarray) -> float:
@@ -199,5 +199,4 @@ def study(full: bool) -> Answer:
     if full:  # what a machine with other work on it would not show
         checks += _cost(days)
     checks += _announced(full, whole)
-    figure = picture(whole, rest, found)
-    return checks, figure
+    return checks, picture(whole, rest, found)

@@ -66,10 +66,9 @@ def study(full: bool) -> Answer:
     """Five amplitudes at three levels."""
     runs = [run(level) for level in range(len(LEVELS))]
     fits = [fitted(result) for result in runs]
-    figure = picture(runs[-1], fits[-1])
     return [
         Check(f"{line}, {name}", fit.amplitude(line), published, 0.5, "mas",
               "rigid-Earth series; lines that 50 years can't tell apart", "absolute")
         for name, fit in zip(LEVELS, fits, strict=True)
         for line, (_, _, published) in nutation.PUBLISHED.items()
-    ], figure  # fmt: skip
+    ], picture(runs[-1], fits[-1])  # fmt: skip

@@ -236,5 +236,4 @@ def study(full: bool) -> Answer:
                 analysis = case.analysis("quadruple", ["angular_velocity"])
                 checks += checks_of(case, analysis, 1e-28, "quadruple")
     checks += librations()
-    figure = picture(drawn)
-    return checks, figure
+    return checks, picture(drawn)

@@ -1,15 +1,11 @@
 """A rigid Earth turned by Moon, Sun and planets, with heyoka alone: its nutations beside the published ones.
 
-python -m experiments.bare.earth [--level 1|2|3] [--days 18264] [--package de421]
-
 Level 1 is degree 2 with Moon and Sun, level 2 adds J3 and the planets, level 3 the difference of the
 equatorial moments and the tesserals of degree 3 (felt by the Moon and the Sun). Moments from H = (C -
 A)/C of the rigid-Earth series and the package's J2. Rates in body axes and a quaternion, kilometres and
 days, blocks as in ``moon``.
 """
 
-import argparse
-import json
 import math
 import time
 from typing import Any
@@ -19,7 +15,6 @@ import numpy as np
 
 from experiments.bare import blocks, mechanics, precession
 from experiments.bare.mechanics import total
-from experiments.real_bodies import nutation
 
 H = 0.0032737548
 RADIUS = 6378.1366
@@ -84,7 +79,6 @@ class Earth:
         count = math.ceil(days / blocks.DAYS)
         places = self.kernel.places("earth", self.sources, START, count)
         columns = blocks.Columns({name: blocks.powers(x, blocks.terms(x)) for name, x in places.items()})
-        began = time.process_time()
         integrator = hy.taylor_adaptive(
             self.equations(columns), self.initial(), compact_mode=True, pars=columns.rows[0]
         )
@@ -103,7 +97,6 @@ class Earth:
             "dates": dates,
             "quaternion": np.concatenate(states),
             "steps": steps,
-            "compile": compiled - began,
             "seconds": done - compiled,
         }
 
@@ -112,27 +105,3 @@ def figure_axis(quaternions: np.ndarray) -> np.ndarray:
     """Of the body's z axis, in space axes, (n, 3)."""
     q = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
     return np.stack([row[2] for row in mechanics.body_to_space(list(q.T))], axis=1)
-
-
-def main() -> None:
-    """One run, told in a line of JSON."""
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--level", type=int, default=3)
-    options.add_argument("--days", type=float, default=18264.0)
-    options.add_argument("--package", default="de421")
-    given = options.parse_args()
-    earth = Earth(given.package, given.level)
-    found = earth.integrate(given.days)
-    lines = nutation.fit(found["dates"], figure_axis(found["quaternion"]), earth.free_rate)
-    shown = {key: found[key] for key in ("steps", "compile", "seconds")}
-    shown["amplitudes"] = {
-        name: [round(lines.amplitude(name), 3), published]
-        for name, (_, _, published) in nutation.PUBLISHED.items()
-    }
-    shown["free"], shown["rest"] = abs(lines.free), float(np.sqrt(np.mean(abs(lines.rest) ** 2)))
-    shown["secular"] = [str(np.round(x, 3)) for x in lines.secular]
-    print(json.dumps(shown))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,21 +1,15 @@
 """The full Moon of DE421 with heyoka alone: degree 4, Sun, planets, Earth's figure, tide, spin, delay, core.
 
-python -m experiments.bare.moon [OUT.npz] [--days 18264] [--package de421] [--without core,degree4,...]
-
 States are the mantle's momentum (not its rate), the core's rate in the mantle's axes, and a quaternion:
 with the momentum nothing asks for the distorted tensor's rate of change, since L' = N + N_c - w x L, and
 w = (I + dI - I_c)^-1 L. What dI needs of w is taken from the undistorted tensor first, then from that
 result (dI/I is 1e-6: the second time is exact to rounding). The delayed tide is computed from the Earth's
 polynomial at t - tau itself, in the body axes of then, to the third order in the angle turned since.
 Kilometres and days; each block of four days has its own time, and the sources' polynomials are parameters
-of the compiled system. What is left over against the package's own librations is printed; nothing is
-fitted.
+of the compiled system. Nothing is fitted to the package's own librations.
 """
 
-import argparse
-import json
 import math
-import resource
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -188,9 +182,7 @@ class Moon:
     def integrate(self, days: float, tolerance: float | None = None) -> dict[str, Any]:
         """States at the block edges, and the cost."""
         count = math.ceil(days / blocks.DAYS)
-        began = time.process_time()
         columns = self.columns(count)
-        read = time.process_time()
         options = {} if tolerance is None else {"tol": tolerance}
         integrator = hy.taylor_adaptive(
             self.equations(columns), self.initial(columns), compact_mode=True, pars=columns.rows[0], **options
@@ -209,10 +201,7 @@ class Moon:
             "quaternion": found[:, 3:7],
             "states": found,
             "steps": steps,
-            "read": read - began,
-            "compile": compiled - read,
             "seconds": done - compiled,
-            "expressions": len(integrator.decomposition),
         }
 
 
@@ -252,35 +241,6 @@ def matrices(quaternions: np.ndarray) -> np.ndarray:
     return np.moveaxis(np.array(mechanics.body_to_space(list(q.T))), -1, 0)
 
 
-def left_over(package: str, start: float, days: np.ndarray, quaternions: np.ndarray) -> dict[str, Any]:
+def left_over(package: str, start: float, days: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
     """Rotation vectors from the package's librations to these attitudes, milliarcseconds."""
-    vectors = between(matrices(quaternions), librations(package, start + days)) * MAS
-    return {
-        "vectors": vectors,
-        "rms": float(np.sqrt((vectors**2).sum(axis=1).mean())),
-        "components": np.abs(vectors).max(axis=0).tolist(),
-    }
-
-
-def main() -> None:
-    """One run, told in a line of JSON."""
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("out", nargs="?")
-    options.add_argument("--days", type=float, default=18264.0)
-    options.add_argument("--package", default="de421")
-    options.add_argument("--without", default="")
-    options.add_argument("--tolerance", type=float)
-    given = options.parse_args()
-    moon = Moon(given.package, [name for name in given.without.split(",") if name])
-    found = moon.integrate(given.days, given.tolerance)
-    rest = left_over(given.package, moon.start, found["days"], found["quaternion"])
-    if given.out:
-        np.savez(given.out, days=found["days"], states=found["states"], vectors=rest["vectors"])
-    shown = {key: found[key] for key in ("steps", "expressions", "read", "compile", "seconds")}
-    shown |= {"rms_mas": rest["rms"], "largest_mas": rest["components"]}
-    shown["peak"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    print(json.dumps(shown))
-
-
-if __name__ == "__main__":
-    main()
+    return between(matrices(quaternions), librations(package, start + days)) * MAS

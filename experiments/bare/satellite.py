@@ -6,12 +6,8 @@ and 3.5, Wertz 1978, 17.2), the Earth's shadow of a point Sun, a magnet and eddy
 radii and circular periods over 2 pi for units; sides of faces are numbers that events turn. Or a sphere in
 place of box and panel, which has no sides, in full light or with the shadow. The scenes are in
 ``experiments/satellite_cost.py``.
-
-python -m experiments.bare.satellite [--hours 24]
 """
 
-import argparse
-import json
 import math
 import time
 from collections.abc import Sequence
@@ -165,7 +161,6 @@ class Satellite:
 
     def integrate(self, hours: float = 24.0, samples: int = 1441) -> dict[str, Any]:
         """Samples in SI, and the cost."""
-        began = time.process_time()
         equations, looks = self.equations()
         start = [x / RADIUS for x in POSITION] + [v * UNIT / RADIUS for v in VELOCITY]
         size = math.sqrt(dot(QUATERNION[:3], QUATERNION[:3]) + QUATERNION[3] ** 2)
@@ -203,13 +198,5 @@ class Satellite:
             "angular_velocity": rows[:, 6:9] / UNIT,
             "quaternion": rows[:, 9:] / np.linalg.norm(rows[:, 9:], axis=1, keepdims=True),
             "steps": steps,
-            "compile": compiled - began,
             "seconds": done - compiled,
         }
-
-
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(prog="python -m experiments.bare.satellite")
-    parser.add_argument("--hours", type=float, default=24.0)
-    found = Satellite().integrate(parser.parse_args().hours)
-    print(json.dumps({key: found[key] for key in ("steps", "compile", "seconds")}))
