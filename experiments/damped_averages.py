@@ -1,18 +1,10 @@
 """A rotation that is damped: how far is its average from the full motion, in momentum, energy and wobble?
 
-Method: a body with moments 1 : 1.7 : 2 that tumbles, under a viscous torque that takes nine tenths of its
-energy over 10,000 turns (--full; 1,000 with ten times the torque otherwise), alone and under a gravity
-gradient beside it; every rotation resolved, and averaged. An axisymmetric body, whose rates decay
-exponentially. The first body at eight sizes of the torque. Then random bodies with random torques (40 with
---full, 10 otherwise), of which each averaged run announces its errors.
-
-Held against:
-- the errors that the averaged runs announce for the momentum's direction, its size and the energy;
-- the wobble, the angle from the axis of the largest moment to the momentum: its extremes in the last of 50
-  parts of the full motion, and those of the free motion with the averaged momentum and energy, within what
-  their announced errors and their change over that part make of these;
-- the exact solution of the axisymmetric body, to the tolerance over ten e-foldings;
-- the order: errors are in proportion to the torque over momentum times rate, if the same share is lost.
+A body with moments 1 : 1.7 : 2 tumbles under a viscous torque that takes nine tenths of its energy over
+10,000 turns (--full; 1,000 with ten times the torque otherwise), alone and under a gravity gradient; again at
+eight sizes of the torque, to which errors are proportional if the same share is lost. An axisymmetric body's
+rates decay exponentially. Random bodies with random torques (40 with --full, 10 otherwise) announce their
+errors.
 """
 
 import sys

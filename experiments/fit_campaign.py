@@ -1,16 +1,14 @@
 """Are the sigmas of `fit` right, and does it say what data can't determine?
 
-Method: random bodies, free, braked or under gravity about a fixed point, are integrated by SciPy's DOP853 at
-3e-14 (which shares no code with rigidsim), seen at random times with noise of known size, as quaternions or
-Euler angles, as angular velocities, or both. `fit` starts elsewhere, and near where the body is a top, which
-may be chaotic. Some numbers have a prior from which the config's value was drawn; in some scenes the load is
-only considered, and drawn from its sigma, too.
+Random bodies, free, braked or under gravity about a fixed point, are integrated by SciPy's DOP853 at 3e-14,
+seen at random times with noise of known size, as quaternions or Euler angles, as angular velocities, or both.
+`fit` starts elsewhere, and near where the body is a top, which may be chaotic. Some numbers have a prior from
+which the config's value was drawn; in some scenes the load is only considered, and drawn from its sigma, too.
 
 Checked: e' P^-1 e of each scene, with e the errors of the estimate and P its covariance, is chi-square
-distributed (Kolmogorov's p above 0.01), and 68.3 and 95.4 % of all errors are within one and two sigmas to
-3 %. In scenes with directions that are undetermined by symmetry or scaling, each is found and nothing else.
-The covariance with a considered number is that of Tapley, Schutz and Born's formula, by derivatives from
-SciPy's motions, to 1e-6.
+distributed (Kolmogorov's p above 0.01), and 68.3 and 95.4 % of all errors are within one and two sigmas to 3
+%. Directions that are undetermined by symmetry or scaling are found, and nothing else. The covariance with a
+considered number is that of Tapley, Schutz and Born's formula, by derivatives from SciPy's motions, to 1e-6.
 
 Run: python -m experiments.fit_campaign [--scenes N] [--nulls N] [--seed N]      exit code 1 if one fails
 """

@@ -1,14 +1,11 @@
 """At equal attitude error, what do rigidsim, bare heyoka and other integrators cost?
 
-Question: a free asymmetric top, a heavy symmetric top and a tumbling satellite under gravity gradient, over
-about 140 and 9000 rad: how many CPU seconds of integration for an attitude error of 1e-6, 1e-9, 1e-12 rad at
-the end, as a ratio to bare heyoka at its best setting?
-
-Method: each peer in fresh processes, in turn, ``--repeats`` times; per setting the fastest of several calls
-in a process, the median over processes; imports and compilation apart. The error is the angle between the
-final attitude and that of 128-bit arithmetic (the tests hold that against closed forms). The cost at an error
-is read off a peer's points: of all its settings the cheapest, interpolated in the logarithms. A peer that
-isn't installed is left out with a message.
+A free asymmetric top, a heavy symmetric top and a tumbling satellite under gravity gradient, over about 140
+and 9000 rad. Each peer runs in fresh processes, in turn; per setting the fastest of several calls in a
+process, the median over processes; imports and compilation apart. The error is the angle between the final
+attitude and that of 128-bit arithmetic. The cost at an error is that of the cheapest of a peer's settings,
+interpolated in the logarithms, as a ratio to bare heyoka at its best. A peer that isn't installed is left out
+with a message.
 
 Run: python -m experiments.peer_comparison [--repeats 3] [--full] [--peers heyoka,rigidsim,...]
 """
@@ -70,26 +67,6 @@ def _ratio(cost: float | None, bare: float | None) -> str:
     if cost is None:
         return "–"
     return f"({1e3 * cost:.3g} ms)" if bare is None else f"{cost / bare:.3g}"
-
-
-def settings(measured: Measured, cases: Sequence[tuple[str, float]]) -> list[str]:
-    """Markdown: each setting's most accurate point, what it costs, and what comes before it."""
-    lines = ["| scene, end | way | best error, rad | CPU ms | whole call, ms | compile, s |"]
-    lines.append("| --- " * 6 + "|")
-    for scene, end in cases:
-        for peer in ADAPTERS:
-            points = measured.of(scene, end, peer)
-            for title in dict.fromkeys(p.title for p in points):
-                curve = frontier([p for p in points if p.title == title])
-                if not curve:
-                    continue
-                best = curve[-1]
-                whole, compiled = statistics.median(best.whole), max(max(p.prepare) for p in curve)
-                lines.append(
-                    f"| {scene}, {end:g} s | {title} | {best.error:.1e} | {1e3 * best.cost:.3g} "
-                    f"| {1e3 * whole:.3g} | {compiled:.2g} |"
-                )
-    return lines
 
 
 def draw(measured: Measured, cases: Sequence[tuple[str, float]], out: Path) -> Path:
@@ -163,7 +140,7 @@ def campaign(
     asked = chosen(peers, ADAPTERS)
     cases = [(name, end) for name in chosen(scenes, SCENES) for end in SCENES[name].ends[: 1 if short else 2]]
     measured = measure(asked, cases, repeats=repeats, stride=1 if full else 3, fill=0.05, cap=cap)
-    print("\n".join([*rows(measured, cases), "", *settings(measured, cases), ""]))
+    print("\n".join([*rows(measured, cases), ""]))
     for peer, seconds in measured.imports.items():
         print(f"import of {peer}: {statistics.median(seconds):.2f} CPU s")
     print("\n".join(measured.notes))

@@ -8,7 +8,6 @@ digit of 6798.38 d. The real Earth (IAU 2000B) must differ where its fluid core 
 lines.
 """
 
-import sys
 from typing import Any
 
 import mpmath
@@ -162,20 +161,6 @@ def unfolding(found: Any, thin: Any, blind: Any) -> list[Check]:
     return checks
 
 
-def listing(found: Any) -> str:
-    """The four terms beside the published ones, as Markdown."""
-    rows = ["| term | argument | longitude, arcsec | rigid | real | obliquity, arcsec | real |",
-            "| --- | --- | --- | --- | --- | --- | --- |"]  # fmt: skip
-    for name, (real_longitude, real_obliquity) in REAL.items():
-        along, across = (line_of(found, s, name) for s in ("node_longitude.figure", "obliquity.figure"))
-        rows.append(
-            f"| {along.period / DAY:.4f} d | {along.label.text} | {float(along.amplitude) / ARCSEC:.4f} | "
-            f"{RIGID.get(name, '')} | {real_longitude:.4f} | "
-            f"{float(across.amplitude) / ARCSEC:.4f} | {real_obliquity:.4f} |"
-        )
-    return "\n".join(rows)
-
-
 def picture(found: Any, thin: Any) -> Picture:
     """The spectrum of the longitude with its lines, from dense samples and from 20-day ones."""
 
@@ -223,5 +208,4 @@ def study(full: bool) -> Answer:
     folded = simulate(config(60, mpmath.nstr(synodic / 2, 20))).dataset
     blind = rigidsim.analyse(folded, ["node_longitude.figure"], lines=12)
     checks = precession(found) + nutation(found) + unfolding(found, thin, blind)
-    print(listing(found), file=sys.stderr)
     return checks, picture(found, thin)

@@ -1,14 +1,10 @@
 """Does a rigid Earth nutate as the published series of a rigid Earth say?
 
-Method: the ready scene `rigid_earth_nutation` (the Moon, the Sun and the planets of JPL's DE421) over 50
-years around J2000, at three levels: degree 2 with the Moon and the Sun; then J3 and the planets; then
-unequal equatorial moments and the tesserals of degree 3. The figure axis on the mean equator and equinox
-of date (precession of IAU 1976), every line above 0.1 mas fitted in both senses at once, with a cubic and
-the free nutation.
-
-Held against: five published circular amplitudes of a rigid Earth's figure axis, to 0.5 mas: lines of
-182.62 and 182.63 d, and of 365.22 and 365.26 d, can't be told apart in 50 years, which alone leaves 0.3
-mas.
+The ready scene `rigid_earth_nutation` (Moon, Sun and planets of JPL's DE421), 50 years around J2000, at three
+levels: degree 2 with the Moon and the Sun; then J3 and the planets; then unequal equatorial moments and the
+tesserals of degree 3. The figure axis on the mean equator and equinox of date (precession of IAU 1976), every
+line above 0.1 mas fitted in both senses at once, with a cubic and the free nutation. Lines of 182.62 and
+182.63 d, and of 365.22 and 365.26 d, can't be separated in 50 years, which alone leaves 0.3 mas.
 """
 
 from experiments.bare import precession

@@ -2,15 +2,11 @@
 
 A spinning CubeSat at 400 km: the Earth's field to degree 4, gravity gradients of Earth and Sun, drag and
 light on a box and a panel (sides that turn away end a step), the shadow of a point Sun, a magnet and eddy
-currents in a dipole. ``experiments/bare/satellite.py`` writes the same with heyoka alone, from the formulas
-of Montenbruck & Gill and of Wertz, without the work and the drifts that a run has as well.
-
-With a sphere in place of box and panel nothing turns away, and without the shadow no step ends on a surface:
-three rows tell what surfaces cost.
-
-Held against: that script's attitudes, rates and positions (1e-9 of their size); its steps and CPU from the
-first step to the last sample (1.15 asked), the least of several turns over the least, without compiling or
-estimates.
+currents in a dipole. ``experiments/bare/satellite.py`` writes the same with heyoka alone, without the work
+and the drifts that a run has as well. With a sphere nothing turns away, and without the shadow no step ends
+on a surface: three rows show what surfaces cost. CPU from the first step to the last sample (1.15 asked) is
+the least of several turns, without compiling or estimates; attitudes, rates and positions agree to 1e-9 of
+their size.
 
 Run: python -m experiments.satellite_cost [--turns 5] [--hours 24]      exit code 1 if the motions differ
 """

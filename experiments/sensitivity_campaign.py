@@ -1,15 +1,12 @@
 """Are sensitivities right? Random keys and scenes, against differences of runs in higher precision.
 
-    python -m experiments.sensitivity_campaign --scenes 200
+Each case draws a scene (``sensitivity_scenes``) and one number of its config. A run in double precision
+records the derivatives. Four runs with this number moved, in quadruple precision, give the central difference
+of fourth order: steps h of 1e-6 leave some h^4 = 1e-24, and 1e-13 for the 80 bits in which they are
+subtracted. They share nothing with the variational equations but the way from a config to equations. The
+largest difference along the run, relative to the derivative's largest value there, may be 1e-9.
 
-Each case draws a scene (free bodies, tops, torques with parameters, gravity gradients along orbits, flight,
-rotors, cores, elastic bodies, dipoles, states of one's own; written in any formulation, with and without held
-invariants) and one number of its config. A run in double precision records the derivatives. Four runs with
-this number moved, in quadruple precision, give the central difference of fourth order: steps h of 1e-6 leave
-some h^4 = 1e-24, and 1e-13 for the 80 bits in which they are subtracted. They share nothing with the
-variational equations but the way from a config to equations. The largest difference along the run, relative
-to the derivative's largest value there, may be 1e-9. ``--scenes 1 --first N``
-repeats a case; the exit code is 1 if one is off.
+Run: python -m experiments.sensitivity_campaign [--scenes 200] [--first 0]      exit code 1 if one is off
 """
 
 import warnings

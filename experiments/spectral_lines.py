@@ -1,16 +1,12 @@
 """How many digits do the lines of a spectrum have, and are they called what they are?
 
-Method: closed forms in double precision over ten thousand periods (--full: in quadruple precision too), and a
-satellite on a circular orbit that librates by 1e-5 rad, integrated; ``rigidsim.analyse`` finds the lines of
-rates in body axes and of the figure axis in space, and names them.
-
-Held against:
-- ``closed_forms``: periods and precession of the free asymmetric body, of Toutatis and of a heavy top;
-- Toutatis' periods as published, and as re-computed for this project from the state of Hudson & Ostro 1995;
-- 1e-14 of a scene's fastest known frequency for lines above 1e-3 of the largest (1e-28 in 128 bits); for
-  fainter ones the error as a phase over the run, times their share of the largest line, within 1e-13;
-- the satellite: n sqrt(3 (B - A) / C), and s^4 + n^2 (1 + 3 sx + sx sz) s^2 + 4 n^4 sx sz = 0, to 1e-8: of
-  the order of the amplitude squared.
+Closed forms in double precision over ten thousand periods (--full: in quadruple precision too), and a
+satellite on a circular orbit that librates by 1e-5 rad, integrated; ``rigidsim.analyse`` finds and names the
+lines of rates in body axes and of the figure axis in space. Lines above 1e-3 of the largest have 1e-14 of the
+scene's fastest known frequency (1e-28 in 128 bits); fainter ones, the error as a phase over the run times
+their share of the largest line, 1e-13. Toutatis has its published periods, too (Hudson & Ostro 1995). The
+satellite's frequencies are n sqrt(3 (B - A) / C), and s^4 + n^2 (1 + 3 sx + sx sz) s^2 + 4 n^4 sx sz = 0, to
+the order of the amplitude squared.
 """
 
 from dataclasses import dataclass

@@ -1,18 +1,12 @@
 """Are the announced errors of a sweep's members true?
 
-Question: members of a sweep run side by side, and what each is announced to be wrong by is measured by
-neighbours that are carried along in batches. Is it, whatever the motion?
+Random members of several kinds of sweeps run side by side, with neighbours in the same batches: free bodies,
+some near the separatrix, satellites on eccentric orbits, planar spins in a chaotic sea, tops, damped and
+driven bodies, flights. Each runs again with 80 bits, whose errors are two thousand times smaller, and its
+last attitude (and position) is compared by the rules of ``error_coverage``. Among fewer than a hundred
+members 1 % is one of them.
 
-Method: random members of several kinds of sweeps: free bodies, among them some near the separatrix,
-satellites on eccentric orbits, planar spins in a chaotic sea, tops, bodies that are damped and driven, bodies
-that fly past what attracts them. Each is run again with 80 bits, whose errors are two thousand times smaller,
-and its last attitude (and position) compared.
-
-Held against: the rules of ``experiments/error_coverage.py``: the true error is at most three times the
-announced one in 99 % of the members, in none more than ten times without a warning, and announced errors are
-at most twenty times the true one in the median. Among fewer than a hundred members 1 % is one of them.
-
-Run: python -m experiments.sweep_coverage [--members 60] [--seed 1] [--only KIND ...] [--out DIR]
+Run: python -m experiments.sweep_coverage [--members 60] [--seed 1] [--only "KIND KIND"] [--out DIR]
 """
 
 import math

@@ -1,20 +1,12 @@
 """A tumbling body under the Sun: what does its average keep, over 10,000 orbits and over 100,000 years?
 
-Method: a triaxial body that tumbles 230 times a revolution on an eccentric orbit, 10,000 revolutions (--full;
-200 otherwise) with every rotation resolved, beside both averages. Then Toutatis, an asteroid that tumbles
-about its long axis, on its orbit about the Sun for 100,000 years, averaged over rotation and orbit, with the
-full motion beside it for 2,000 of them (--full; 100 otherwise).
-
-Held against:
-- the errors that the averaged runs announce for the momentum's direction;
-- energy and size of the momentum, which don't change on average: their means over the last tenth of the full
-  motion and the first, within a tenth of what they swing by meanwhile;
-- the wobble, the angle from the figure axis to the momentum: its extremes in the last tenth of the full
-  motion and those of the free motion of the same energy and momentum, within what their swing makes of these;
-- the rate of precession -3/2 (G M / a^3) (1 - e^2)^(-3/2) (D / L) cos(obliquity) about the orbit's normal,
-  with D from the mean of l . I l along the free motion, taken from Euler's equations step by step (DOP853),
-  without the elliptic integrals of the model; within the part of a turn that the precession makes in one
-  orbit, which is the size of what the average adds in second order.
+A triaxial body tumbles 230 times a revolution on an eccentric orbit, 10,000 revolutions (--full; 200
+otherwise), in full and by both averages; then Toutatis for 100,000 years, with 2,000 of them in full (--full;
+100 otherwise). Energy and size of the momentum don't change on average. The momentum precesses about the
+orbit's normal at -3/2 (G M / a^3) (1 - e^2)^(-3/2) (D / L) cos(obliquity), with D from the mean of l . I l
+along the free motion, taken from Euler's equations step by step (DOP853), without the elliptic integrals of
+the model; within the part of a turn that it makes in one orbit, which is the size of what the average adds in
+second order.
 """
 
 import json

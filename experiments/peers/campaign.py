@@ -117,10 +117,7 @@ def _note(
         if key not in measured.points:
             error = angle(record["quaternion"], truths[case])
             measured.points[key] = Point(peer, record["title"], *case, record["knob"], error)
-        point = measured.points[key]
-        point.seconds.append(record["seconds"])
-        point.whole.append(record["whole"])
-        point.prepare.append(record["prepare"])
+        measured.points[key].seconds.append(record["seconds"])
         if record["whole"] > _SLOW and peer not in (BARE, OURS):
             slow.add(key)
     if note and note not in measured.notes:
