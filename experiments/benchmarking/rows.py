@@ -27,15 +27,8 @@ _EXTENDED_TOLERANCE = 2.0**-66
 _MODULE = ("-m", "experiments.benchmarking.ours")
 
 
-@dataclass(frozen=True)
-class Job:
-    """One thing that is run in a fresh process.
-
-    Attributes:
-        run: takes a folder of its own, and whether estimates are on.
-    """
-
-    run: Callable[[Path, bool], Figures]
+Job = Callable[[Path, bool], Figures]
+"""Something to run in a fresh process: takes a folder, and whether estimates are on."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +65,7 @@ class Scene:
     precision: str = "double"
     timeline: bool = False
 
-    def config(self, folder: Path, *, estimate: bool) -> str:
+    def config(self, folder: Path, estimate: bool) -> str:
         """The path of its config, written into a folder."""
         path = folder / "benchmark.toml"
         values = {"end": self.end, "samples": self.samples, "precision": self.precision}
@@ -83,43 +76,31 @@ class Scene:
     @property
     def run(self) -> Job:
         """A run folder, imports apart."""
-        return Job(
-            lambda folder, estimate: told([*_MODULE, self.config(folder, estimate=estimate), str(folder)])
-        )
+        return lambda folder, estimate: told([*_MODULE, self.config(folder, estimate), str(folder)])
 
     @property
     def command(self) -> Job:
         """The command line as a whole."""
-
-        def go(folder: Path, estimate: bool) -> Figures:
-            config = self.config(folder, estimate=estimate)
-            return whole(["-m", "rigidsim", "run", config, "--out", str(folder)])
-
-        return Job(go)
+        begin = ("-m", "rigidsim", "run")
+        return lambda folder, estimate: whole([*begin, self.config(folder, estimate), "--out", str(folder)])
 
     @property
     def warm(self) -> Job:
         """In memory, again and again."""
-
-        def go(folder: Path, estimate: bool) -> Figures:
-            return told([*_MODULE, self.config(folder, estimate=estimate), "--again", str(_TIMES)])
-
-        return Job(go)
+        again = ("--again", str(_TIMES))
+        return lambda folder, estimate: told([*_MODULE, self.config(folder, estimate), *again])
 
     def script(self, kind: str, tolerance: float | None = None) -> Job:
         """The script of ``experiments/bare``; at heyoka's own tolerance unless another is given."""
-
-        def go(folder: Path, _: bool) -> Figures:
-            more = ["extended"] if self.precision == "extended" else []
-            more += [] if tolerance is None else [repr(tolerance)]
-            return told([SCRIPT, kind, str(folder / "bare.h5"), str(self.end), str(self.samples), *more])
-
-        return Job(go)
+        more = ["extended"] if self.precision == "extended" else []
+        more += [] if tolerance is None else [repr(tolerance)]
+        given = [str(self.end), str(self.samples), *more]
+        return lambda folder, _: told([SCRIPT, kind, str(folder / "bare.h5"), *given])
 
 
 def imports(*modules: str) -> Job:
     """An interpreter that does nothing but import."""
-    return Job(lambda folder, estimate: whole(["-c", f"import {', '.join(modules)}"]))
+    return lambda folder, estimate: whole(["-c", f"import {', '.join(modules)}"])
 
 
 def rows(*, quick: bool) -> list[Row]:
@@ -173,7 +154,7 @@ def rows(*, quick: bool) -> list[Row]:
         ),
         Row(
             "warm", "tiny scene in a warm process, no files", "bare `taylor_adaptive` + run", 2.0,
-            tiny.warm, Job(lambda folder, estimate: told([SCRIPT, "warm", str(_TIMES)])),
+            tiny.warm, lambda folder, estimate: told([SCRIPT, "warm", str(_TIMES)]),
         ),
     ]  # fmt: skip
 
