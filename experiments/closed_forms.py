@@ -127,13 +127,11 @@ def heavy_top(a: Any, c: Any, mu: Any, theta: Any, rates: Sequence[Any]) -> Heav
         axial, u = c * w3, mpmath.cos(theta)
         vertical = a * w2 * mpmath.sin(theta) + axial * u
         energy = a * (w1**2 + w2**2) / 2 + mu * u
-        # u'^2 = 2 (E - mu u)(1 - u^2)/A - (L_Z - L_z u)^2/A^2
-        cubic = [
-            2 * mu / a,
-            -2 * energy / a - (axial / a) ** 2,
-            -2 * mu / a + 2 * vertical * axial / a**2,
-            2 * energy / a - (vertical / a) ** 2,
-        ]
-        roots = mpmath.polyroots(cubic, maxsteps=1000, extraprec=400)
-        u1, u2, u3 = sorted(mpmath.re(root) for root in roots)
+        # A u'^2 = 2 (E - mu u)(1 - u^2) - (L_Z - L_z u)^2/A = 2 mu (u^3 + b u^2 + c1 u + d), roots by Viete
+        b = -(energy + axial**2 / (2 * a)) / mu
+        c1, d = vertical * axial / (a * mu) - 1, (energy - vertical**2 / (2 * a)) / mu
+        p, q = c1 - b**2 / 3, 2 * b**3 / 27 - b * c1 / 3 + d
+        size = mpmath.sqrt(-p / 3)
+        angle = mpmath.acos(max(-1, min(1, -q / (2 * size**3)))) / 3
+        u1, u2, u3 = sorted(2 * size * mpmath.cos(angle + 2 * mpmath.pi * k / 3) - b / 3 for k in range(3))
         return HeavyTop(a, axial, vertical, u1, u2, u3, mpmath.sqrt(mu * (u3 - u1) / (2 * a)))
