@@ -7,10 +7,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 from rigidsim.accuracy.error_law import CLOSED_FORM
-from rigidsim.accuracy.estimates.estimate import Estimate, estimate_errors, label_rounding
-from rigidsim.accuracy.estimates.margins import UNCERTAIN
-from rigidsim.accuracy.models.modelling import measure_modelling
-from rigidsim.accuracy.models.side_by_side import Unmeasured
+from rigidsim.accuracy.estimates.estimate import UNCERTAIN, Estimate, estimate_errors, label_rounding
+from rigidsim.accuracy.modelling import Unmeasured, measure_modelling
 from rigidsim.errors import ConfigError
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.choices import FULL, REDUCED
@@ -78,7 +76,6 @@ class Diagnostics:
             trail=trail,
             waypoints=None if corrected is None else corrected.effect(Waypoints),
             stepper=stepper,
-            nearest=min(self.statistics.nearest_singularity, self._passed(), 1.0),
             go_on=go_on,
         )
         if found is not None and beside:

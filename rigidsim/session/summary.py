@@ -5,7 +5,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rigidsim.accuracy.models.modelling import modelling_of
+from rigidsim.accuracy.modelling import modelling_of
 from rigidsim.scene.cautions import Caution
 from rigidsim.session.dataset import unused_variables
 from rigidsim.session.diagnostics import Diagnostics, advice_on

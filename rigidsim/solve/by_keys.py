@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import heyoka as hy
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
@@ -24,7 +23,8 @@ from rigidsim.scene.choices import FULL
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.varied_keys import varied_keys
-from rigidsim.solve.compiled import compiled_engine, compiled_function, evaluate_rows
+from rigidsim.solve.compiled import compiled_function, evaluate_rows
+from rigidsim.solve.lanes import BatchEngine, BatchSystem
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 from rigidsim.solve.tangents import Derivatives, LostTangents, Place, Tangents
 
@@ -89,7 +89,9 @@ _WIDTH = 4
 """Lanes of a batch: the fastest for a motion with a tangent, even where registers hold eight."""
 _IN_LANES = 1e-9
 """Tolerance of lanes, which take a third of the time then: derivatives that are right to some 1e-7."""
+_SMALL = -80  # binary exponent of tangents in lanes, whose series have the motion's radius of convergence
 _MOST_STATES = 20  # in lanes, beyond which unrolled code takes long to compile
+_MOST_STEPS = 10**9
 
 
 @dataclass(frozen=True)
@@ -114,24 +116,27 @@ class KeyTangents:
         self.keys, system = len(made.keys), made.plain
         alone = system.pieces is None and not system.clocked and not system.switches and made.first == 0
         small = not system.wide and len(system.states) <= _MOST_STATES
-        self._lanes = quickly and precision.name == "double" and alone and small
         derivatives = Derivatives(system, made.equations, made.outputs, made.first, made.count)
         slopes = made.coefficients.initial_slopes
         self._moving = derivatives.felt([i for i, row in enumerate(slopes) if any(x != 0 for x in row)])
-        more: dict[str, Any] = {"width": _WIDTH, "tol": _IN_LANES} if self._lanes else {"compact_mode": True}
-        self.tangents = Tangents(
-            derivatives, self._moving, 1 if self._lanes else self.keys, precision, **more
-        )
+        equations, (along,) = derivatives.equations(self._moving, 1)
+        self._one, self._first_slope = [*system.variables, *along.values()], derivatives.slopes(0).start
+        self._lanes: tuple[BatchEngine, BatchEngine] | None = None
+        if quickly and precision.name == "double" and alone and small:
+            motion = list(zip(system.variables, made.equations, strict=True))
+            self._lanes = (
+                BatchEngine(BatchSystem(motion, [], None, compact=False), 1),
+                BatchEngine(BatchSystem(equations, [], _IN_LANES, compact=False), _WIDTH),
+            )
+        else:
+            self.tangents = Tangents(derivatives, self._moving, self.keys, precision, compact_mode=True)
         outputs = range(len(made.equations), len(made.equations) + len(made.outputs))
-        along = dict(zip(self._moving, self.tangents.one[len(system.states) :], strict=True))
-        first = self.tangents.slopes(0).start
-        self._slopes = [derivatives.along(row, along, first) for row in outputs]
-        self._options = dict(precision.options) if self._lanes else dict(precision.options, compact_mode=True)
+        self._slopes = [derivatives.along(row, along, self._first_slope) for row in outputs]
+        self._options = dict(precision.options, compact_mode=self._lanes is None)
         context = system.scene.context
         self._start = precision.number(context.ldexp(system.scene.start, -system.scaling.time))
         units = [context.ldexp(context.one, e) for one in made.recorded for e in one.exponents]
         self._units = precision.array(units)
-        self._moved: tuple[bytes, np.ndarray] | None = None  # the latest motion, and all it depends on
         self.use(made.coefficients)
 
     def use(self, found: Coefficients) -> None:
@@ -140,12 +145,13 @@ class KeyTangents:
         """
         precision, made = self.precision, self.made
         self._values, self._initial = precision.array(found.values), precision.array(found.initial)
+        self._moved: tuple[np.ndarray, np.ndarray] | None = None  # the latest times, and the motion there
         keys = len(found.initial_slopes[0])
         self._coefficient_slopes, self._initial_slopes = (
             np.array([precision.array(row) for row in rows], dtype=precision.scalar).reshape(len(rows), keys)
             for rows in (found.slopes, [found.initial_slopes[i] for i in self._moving])
         )
-        if self._lanes:
+        if self._lanes is not None:
             return
         tangents, numbers = self.tangents, self.tangents.numbers
         numbers[made.first : made.first + made.count] = self._values
@@ -163,7 +169,7 @@ class KeyTangents:
 
     def begin(self) -> None:
         """Go back to the start."""
-        if not self._lanes:
+        if self._lanes is None:
             self.tangents.begin(self._first)
 
     def sample(self, time: Scalar, go_on: Callable[[], bool] = lambda: True) -> tuple[np.ndarray, np.ndarray]:
@@ -176,20 +182,21 @@ class KeyTangents:
         Raises:
             LostTangents: the motion or a tangent doesn't stay finite.
         """
-        if not self._lanes:
+        if self._lanes is None:
             return self.of(times, [self.sample(time) for time in times])
-        values = self._evaluated(self.made.outputs, self._motion(times), self._values[:, None], times)
-        along: list[np.ndarray] = []
-        for first in range(0, self.keys if slopes else 0, _WIDTH):
-            along += self._in_lanes(times, [min(first + i, self.keys - 1) for i in range(_WIDTH)])
-        return self._rows(values, along[: self.keys])
+        motion, along = self._lanes
+        if self._moved is None or not np.array_equal(self._moved[0], times):
+            states = self._in_lanes(motion, self._initial[:, None], self._values[:, None], times)
+            self._moved = times, states[:, :, 0]
+        values = self._evaluated(self.made.outputs, self._moved[1], self._values[:, None], times)
+        return self._rows(values, self._along(along, times) if slopes else [])
 
     def of(self, times: np.ndarray, samples: Sequence[tuple[np.ndarray, np.ndarray]]) -> Rows:
         """The same at some samples (``sample``), n > 0 of them."""
         scalar, tangents = self.precision.scalar, self.tangents
         states = np.array([state for state, _ in samples], dtype=scalar)
         numbers = np.array([one for _, one in samples], dtype=scalar).T
-        count, known = len(self.system.states), tangents.slopes(0).start
+        count, known = len(self.system.states), self._first_slope
         along = []
         for j in range(self.keys):
             own = np.concatenate([states[:, :count], states[:, tangents.of(j)]], axis=1)
@@ -210,8 +217,7 @@ class KeyTangents:
         self, expressions: Iterable[Any], states: np.ndarray, numbers: np.ndarray, times: np.ndarray
     ) -> np.ndarray:
         """Values (n, expressions) of the outputs, or along a tangent, in states (n, ...), with parameters."""
-        variables = self.tangents.one[: states.shape[1]]
-        function = compiled_function(list(expressions), variables, **self._options)
+        function = compiled_function(list(expressions), self._one[: states.shape[1]], **self._options)
         given = numbers[: function.nparams] if function.nparams else None
         if given is not None and given.shape[1] == 1:
             given = given[:, 0]
@@ -219,39 +225,41 @@ class KeyTangents:
 
     # --- in lanes ---------------------------------------------------------------------------------------
 
-    def _motion(self, times: np.ndarray) -> np.ndarray:
-        """States (n, states) by an integrator of the motion alone."""
-        described = b"".join(x.tobytes() for x in (self._initial, self._values, times))
-        if self._moved is not None and self._moved[0] == described:
-            return self._moved[1]
-        equations = list(zip(self.system.variables, self.made.equations, strict=True))
-        engine = compiled_engine(equations, np.zeros(len(equations)), **self._options)
-        engine.time, engine.state[:], engine.pars[:] = (
-            self._start, self._initial, self._values[: len(engine.pars)],
-        )  # fmt: skip
-        grid = times if times[0] == self._start else np.append(self._start, times)
-        outcome, *_, states = engine.propagate_grid(grid)
-        if outcome != hy.taylor_outcome.time_limit or not np.isfinite(states).all():
-            raise LostTangents("the motion is no longer finite")
-        self._moved = described, np.asarray(states[len(grid) - len(times) :])
-        return self._moved[1]
+    def _along(self, engine: BatchEngine, times: np.ndarray) -> list[np.ndarray]:
+        """Derivatives of the outputs, (n, outputs), by each key: tangents so small that step control doesn't
+        see them.
+        """
+        found: list[np.ndarray] = []
+        states = len(self.system.states)
+        for begin in range(0, self.keys, _WIDTH):
+            moved, driven = (
+                x[:, begin : begin + _WIDTH] for x in (self._initial_slopes, self._coefficient_slopes)
+            )
+            sizes = np.abs(np.concatenate([moved, driven])).max(axis=0, initial=0.0)
+            scales = np.ldexp(1.0, _SMALL - np.frexp(sizes)[1])
+            initial, values = (
+                np.repeat(x[:, None], len(scales), axis=1) for x in (self._initial, self._values)
+            )
+            numbers = np.concatenate([values, driven])
+            pars = np.concatenate([values, driven * scales])
+            there = self._in_lanes(engine, np.concatenate([initial, moved * scales]), pars, times)
+            there[:, states:] /= scales
+            lanes = range(len(scales))
+            found += [
+                self._evaluated(self._slopes, there[:, :, i], numbers[:, i : i + 1], times) for i in lanes
+            ]
+        return found
 
-    def _in_lanes(self, times: np.ndarray, keys: list[int]) -> list[np.ndarray]:
-        """Derivatives of the outputs, (n, outputs), by the key of each lane."""
-        every = np.repeat(self._values[:, None], len(keys), axis=1)
-        self.tangents.numbers[:] = numbers = np.concatenate([every, self._coefficient_slopes[:, keys]])
-        initial = np.repeat(self._initial[:, None], len(keys), axis=1)
-        found: list[list[np.ndarray]] = [[] for _ in keys]
-        begin = 0
-        for states in self.tangents.through(
-            float(self._start), initial, self._initial_slopes[:, keys], times
-        ):
-            block = times[begin : begin + len(states)]
-            begin += len(states)
-            for lane, part in enumerate(found):
-                own = states[:, :, lane]
-                part.append(self._evaluated(self._slopes, own, numbers[:, lane : lane + 1], block))
-        return [np.concatenate(part) for part in found]
+    def _in_lanes(
+        self, engine: BatchEngine, initial: np.ndarray, pars: np.ndarray, times: np.ndarray
+    ) -> np.ndarray:
+        """States (n, all, lanes) at times (n,)."""
+        lanes = initial.shape[1]
+        start, every = np.full(lanes, float(self._start)), np.repeat(times[:, None], lanes, axis=1)
+        found = engine.run(initial, pars, start, every, _MOST_STEPS)
+        if not found.arrived.all() or not np.isfinite(found.states).all():
+            raise LostTangents("they are no longer finite")
+        return found.states
 
 
 def turned(quaternion: np.ndarray, slopes: np.ndarray) -> np.ndarray:

@@ -228,7 +228,6 @@ class Perturbations:
     """
 
     own: float = 0.4  # random error relative to the state's own size
-    shared: float = 0.0  # random error relative to the largest state's size
     first: float = 0.5  # error at the start relative to the state's own size
     clock: float = 0.3  # error of the time, for loads that depend on it
     ahead: float = 0.0  # internal time by which the time in which such a load counts is ahead of the scene's
@@ -289,8 +288,6 @@ class ErrorTangents:
         motions = len(starts.begin)
         self._states = starts.states.copy()
         self._tangents = np.zeros((*starts.states.shape, TANGENTS))
-        self._largest = np.where(np.abs(starts.states) > _NOTHING, np.abs(starts.states), 0.0)
-        self._weigh()
         self.time, self._steps = starts.begin.copy(), np.zeros(motions)
         self._ahead, self._over = np.zeros(motions), np.zeros(motions)
         self._random = np.random.default_rng(0)
@@ -300,10 +297,10 @@ class ErrorTangents:
         self._stride = self._most.copy()
         normal = self._random.standard_normal((len(starts.states), 1, TANGENTS))
         begun = (starts.states != 0) if rounded is None else rounded[:, None]
-        self._add(
-            np.arange(motions), self._errors.first * np.where(begun, self._largest, 0.0)[:, :, None] * normal
-        )
-        self._far = self._distances(np.arange(motions), self._tangents)
+        begun = begun & (np.abs(starts.states) > _NOTHING)
+        sizes = np.where(begun, np.abs(starts.states), 0.0)
+        self._add(np.arange(motions), self._errors.first * sizes[:, :, None] * normal)
+        self._far = self._lengths(self._tangents)
 
     def follow(
         self,
@@ -332,8 +329,7 @@ class ErrorTangents:
     def _go(self, going: np.ndarray, until: np.ndarray) -> None:
         """Follow some motions through one stretch."""
         # the same number of draws in each round, for whichever motions
-        rows = 2 + len(self._states) * (2 if self._errors.shared else 1)
-        normal = self._random.standard_normal((rows, TANGENTS))
+        normal = self._random.standard_normal((2 + len(self._states), TANGENTS))
         before, begin, steps = self._states[:, going], self.time[going], self._steps[going]
         # what moves is rounded; until that is known, little is left out
         stride = np.where(steps > 0, self._stride[going], float(_SHORTEST))
@@ -343,7 +339,7 @@ class ErrorTangents:
         # tangents' lasts for the stretch
         late = self._errors.clock * np.abs(begin + self._errors.ahead) / np.sqrt(expected)
         found, tangents, taken, reached = self._advance(going, late[:, None] * normal[0], until, stride)
-        grown = self._distances(going, tangents)
+        grown = self._lengths(tangents)
         growth = grown / np.maximum(self._far[going], 1e-300)
         followed = np.isfinite(found).all(axis=0) & np.isfinite(tangents).all(axis=(0, 2))
         followed &= steps <= 4 * self._starts.steps[going] + _HOPELESS
@@ -360,9 +356,6 @@ class ErrorTangents:
         self._steps[going] += taken
         self.time[going] = reached
         sizes = np.maximum(np.abs(before), np.abs(found))
-        if (sizes > self._largest[:, going]).any():
-            self._largest[:, going] = np.maximum(self._largest[:, going], sizes)
-            self._weigh()
         sizes = np.where(before != found, sizes, 0.0)  # what stands still isn't rounded
         if angles := self._measures.angles:  # which grow, and step control with them
             found[angles] -= self._measures.turn * np.rint(found[angles] / self._measures.turn)
@@ -370,9 +363,9 @@ class ErrorTangents:
         even = taken >= stride  # one that ended early will be followed by another short one
         likely = np.where(even, self._stride[going], np.minimum(2 * taken, self._stride[going]))
         at_end = reached >= self._starts.end[going]
-        self._perturb(going, sizes, taken, growth, np.where(at_end, 0.0, likely), normal[1:])
+        self._perturb(going, sizes, taken, growth, np.where(at_end, 0.0, likely), normal[2:])
         self._begin_anew(going, reached)
-        self._far[going] = self._distances(going, self._tangents[:, going])
+        self._far[going] = self._lengths(self._tangents[:, going])
         self._note(going)
 
     def _advance(
@@ -418,37 +411,23 @@ class ErrorTangents:
         normal: np.ndarray,
     ) -> None:
         """Add errors of half of the steps taken, and of half of those likely in the next stretch, (motions,),
-        to what moves; of random numbers (1 + states, tangents), and as many more for shared errors.
+        to what moves; of random numbers (states, tangents).
         """
-        errors, states = self._errors, len(sizes)
         left = np.maximum(self._starts.steps[which] - self._steps[which], 1)
         ahead = np.minimum(likely, left) / 2
         steps = np.maximum(taken - self._ahead[which], 0.0) + ahead
         self._ahead[which] = ahead
         # of errors made all along a stretch of exponential growth g a part 1 / ln g grows as much (variances)
         root = np.sqrt(steps / np.minimum(np.maximum(np.log(growth), 1.0), math.log(_WILD)))
-        added = errors.own * (root * sizes)[:, :, None] * normal[1 : 1 + states, None]
-        if errors.shared:
-            size = errors.shared * root * sizes[self._measures.felt].max(axis=0, initial=0.0)
-            moving = self._largest[:, which, None] > 0
-            added += size[:, None] * np.where(moving, normal[1 + states :, None], 0.0)
-        self._add(which, added)
+        self._add(which, self._errors.own * (root * sizes)[:, :, None] * normal[:, None])
 
     def _add(self, which: np.ndarray, added: np.ndarray) -> None:
         self._tangents[:, which] += np.where(self._measures.felt[:, None, None], added, 0.0)
 
-    def _distances(self, which: np.ndarray, apart: np.ndarray) -> np.ndarray:
-        """Length of the longest tangent (motions,), relative to the states' size."""
-        scaled = apart * self._inverse[:, which, None]
-        squares = self._measures.groups @ (scaled * scaled).reshape(len(apart), -1)
-        largest: np.ndarray = np.sqrt(squares.reshape(-1, *apart.shape[1:]).max(axis=(0, 2)))
-        return largest
-
-    def _weigh(self) -> None:
-        """Update inverse sizes (states, motions) of groups; 0 for what nothing feels or never moved."""
-        groups = self._measures.groups
-        sizes = groups.T @ (groups[:, :, None] * self._largest).max(axis=1)
-        self._inverse = np.where(sizes > 0, 1 / np.maximum(sizes, 1e-150), 0.0)
+    def _lengths(self, tangents: np.ndarray) -> np.ndarray:
+        """Length of the longest tangent (motions,) of (states, motions, tangents), internal units."""
+        felt = tangents[self._measures.felt]
+        return np.asarray(np.sqrt((felt * felt).sum(axis=0)).max(axis=1))
 
     def _note(self, which: np.ndarray) -> None:
         states, tangents = self._states[:, which], self._tangents[:, which]
@@ -494,12 +473,11 @@ class Starts:
 
 
 class Measures:
-    """Groups of a system's states, and angles between attitudes.
+    """Sizes of differences between a system's states.
 
     Attributes:
         places: indices of the states of each quantity ("rates", "attitude", "position", "velocity").
         felt: mask of the states that anything depends on, (states,).
-        groups: (groups, states), 1 for states that are measured together.
         carried: whether there is an attitude.
         angles, turn: indices of the states that are angles growing without bound, and their full turn.
     """
@@ -509,12 +487,6 @@ class Measures:
         self.places = {group: [names.index(n) for n in of if n in names] for group, of in _GROUPS.items()}
         self.places["attitude"] = [] if attitude is None else [names.index(n) for n in attitude.names]
         self.felt = np.array([n not in _IDLE and not n.startswith(TANGENT) for n in names])
-        grouped = {place for places in self.places.values() for place in places}
-        alone = [[n] for n in range(len(names)) if n not in grouped and self.felt[n]]
-        together = [*filter(None, self.places.values()), *alone]
-        self.groups = np.zeros((len(together), len(names)))
-        for row, places in enumerate(together):
-            self.groups[row, places] = 1.0
         self.carried = attitude is not None
         self.angles, self.turn = list(system.angle_states), math.ldexp(2 * math.pi, -system.angle_unit)
         self._attitude = attitude

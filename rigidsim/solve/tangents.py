@@ -8,14 +8,13 @@ quaternion's sign continued where equations read them.
 
 Each tangent is carried times a power of two, chosen anew on the way so that step control sees numbers of
 order one whatever the tangent's unit and however it grows: the equations are linear in it, and nothing is
-rounded thereby. In lanes, each of which carries the motion with other tangents, these are so small that step
-control doesn't see them: their series have the same radius of convergence as the motion's.
+rounded thereby.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,18 +24,15 @@ import numpy as np
 from rigidsim.model.parametrised import parameters_of
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
-from rigidsim.solve.compiled import Kept, compiled_engine
+from rigidsim.solve.compiled import compiled_engine
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.stepper import longest_step
 from rigidsim.solve.switching.turned import Turned
 
 _LARGE, _SMALL = 1, -2  # binary exponents between which a tangent's largest component is left as it is
-_IN_LANES = -80  # binary exponent of tangents in lanes
 _LOOK = 64  # steps between two looks at whether to go on
 _STRIDE = 16  # steps between two looks at the tangents' sizes where no step is asked for by itself
-_BLOCK = 20_000  # samples of lanes that are held at once
 _SINGLE_STEPS_LOST = 1000  # steps without progress in time, before the motion is given up
-_engines: Kept[Any] = Kept(8)
 
 Row = dict[int, Symbolic]
 """Derivatives of an expression that aren't zero everywhere, by the number of the variable."""
@@ -140,14 +136,12 @@ class Tangents:
     """A motion of a system with tangents of some of its states, ``moving``.
 
     Args:
-        count: number of tangents; in lanes, of each lane.
-        width: number of lanes of a batch; 0 for a motion by itself.
+        count: number of tangents.
         options: of the engine, as ``tol`` and ``compact_mode``.
 
     Attributes:
-        one: variables of the motion, then of its first tangent.
         numbers: parameters that equations and outputs read: the system's, coefficients, and the derivatives
-            of these along each tangent; in lanes, (parameters, lanes). To be set before ``begin``.
+            of these along each tangent. To be set before ``begin``.
     """
 
     def __init__(
@@ -156,19 +150,15 @@ class Tangents:
         moving: Sequence[int],
         count: int,
         precision: Precision,
-        *,
-        width: int = 0,
         **options: Any,
     ) -> None:
         self.system, self.precision, self.moving, self.count = derivatives.system, precision, moving, count
         self._made, system, names = derivatives, derivatives.system, derivatives.system.states
         self.states = len(names)
-        equations, tangents = derivatives.equations(moving, count)
-        self.one = [*system.variables, *tangents[0].values()]
-        options = {**precision.options, **options}
-        shape = (len(equations), width) if width else (len(equations),)
-        self.numbers = precision.zeros((self.slopes(count).start, *shape[1:]))
-        self._engine = _engine(equations, precision.zeros(shape), options)
+        equations, _ = derivatives.equations(moving, count)
+        self.numbers = precision.zeros((self.slopes(count).start,))
+        zeros = precision.zeros((len(equations),))
+        self._engine = compiled_engine(equations, zeros, **{**precision.options, **options})
         self._longest = precision.of_double(longest_step(self._engine.order, precision.scalar))
         self._places = {name: place for place, name in enumerate(names)}
         self._clock = system.parameters - 1 if system.clocked else None
@@ -364,47 +354,3 @@ class Tangents:
             self.numbers[first : first + len(values)] = values
             self._entered = number
         return pieces.knots[number] if number < len(pieces.knots) else None
-
-    # --- side by side -----------------------------------------------------------------------------------
-
-    def through(
-        self, start: float, initial: np.ndarray, tangents: np.ndarray, times: np.ndarray
-    ) -> Iterator[np.ndarray]:
-        """In lanes, states and tangents (block of times, all, lanes) at ascending times (n,), from initial
-        states (states, lanes) and tangents (moving, lanes), of equations that stay the same.
-
-        Raises:
-            LostTangents: they don't stay finite.
-        """
-        engine = self._engine
-        width = self.numbers.shape[1]
-        scales = np.array(
-            [math.ldexp(1.0, _IN_LANES - math.frexp(size)[1]) for size in self._sizes(tangents)]
-        )
-        pars = self.numbers.copy()
-        pars[self.slopes(0)] *= scales
-        engine.set_time(start)
-        engine.state[:] = np.concatenate([initial, tangents * scales])
-        engine.pars[:] = pars[: len(engine.pars)]
-        for begin in range(0, len(times), _BLOCK):
-            block = times[begin : begin + _BLOCK]
-            first = float(engine.time[0])
-            grid = block if block[0] == first else np.append(first, block)
-            _, states = engine.propagate_grid(np.repeat(grid[:, None], width, axis=1))
-            states = np.asarray(states)[len(grid) - len(block) :]
-            if not np.isfinite(states).all():
-                raise LostTangents("they are no longer finite")
-            states[:, self.of(0)] /= scales
-            yield states
-
-    def _sizes(self, tangents: np.ndarray) -> np.ndarray:
-        every = np.abs(np.concatenate([tangents, self.numbers[self.slopes(0)]]))
-        return np.asarray(every.max(axis=0, initial=0.0))
-
-
-def _engine(equations: list[tuple[Symbolic, Symbolic]], zeros: np.ndarray, options: dict[str, Any]) -> Any:
-    """A single engine, or one for lanes."""
-    if zeros.ndim == 1:
-        return compiled_engine(equations, zeros, **options)
-    described = equations, zeros.shape, sorted(options.items())
-    return _engines.get(described, lambda: hy.taylor_adaptive_batch(equations, zeros, **options))

@@ -174,7 +174,7 @@ class TableErrors(SummaryPart):
 
 
 class ModellingWindow(SummaryPart):
-    """A window in which the full model ran beside a reduced one; see ``rigidsim.accuracy.models.modelling``.
+    """A window in which the full model ran beside a reduced one; see ``rigidsim.accuracy.modelling``.
 
     Attributes:
         momentum_axis, figure_axis: largest distances between both models' directions, with what averaging

@@ -6,8 +6,7 @@ from contextlib import suppress
 from typing import Any
 
 from rigidsim.accuracy.choice import CHEAPEST_FIRST, LevelChoice
-from rigidsim.accuracy.models.modelling import measure_modelling
-from rigidsim.accuracy.models.side_by_side import Unmeasured
+from rigidsim.accuracy.modelling import Unmeasured, measure_modelling
 from rigidsim.accuracy.motion import Pilot, run_pilot
 from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.torques import reads_rates_alone

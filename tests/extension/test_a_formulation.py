@@ -129,7 +129,7 @@ def test_its_errors_are_announced_and_true(tmp_path: Path) -> None:
     exact = attitudes("quaternion", "extended")
     true = angle_between(data["quaternion"].values, exact).max()
     assert true <= accuracy["estimated_attitude_error"] <= 100 * true
-    assert "motions near this one" in accuracy["estimated_how"]
+    assert "a solution in quaternions" in accuracy["estimated_how"]
     assert "without the effects" not in accuracy["estimated_how"]
     w = data["quaternion"].values[:, 0]
     assert (np.diff(np.sign(w)) != 0).sum() >= 5  # half turns, where the set is changed

@@ -1,35 +1,81 @@
 """Estimate of a run's errors until its end.
 
-Samples are held against a better solution where there is one at little cost: the closed form, or, where
-tolerance or precision are coarse enough, the same motion at a tighter tolerance in double precision. Else
-the growth of rounding errors is measured by tangents (``rigidsim.accuracy.estimates.following``). Either goes
-over the whole run, or as much of it as the cost allows.
+Samples are held against a better solution where there is one at little cost: the closed form; where tolerance
+or precision are coarse enough, the same motion at a tighter tolerance in double precision; where the states
+are singular somewhere, the same motion in quaternions, which round far less. Else the growth of rounding
+errors is measured by tangents, kicked as each step's rounding does (``rigidsim.solve.error_tangents``).
+
+A run of some ten thousand steps is followed to its end, of a longer one the beginning; the whole where errors
+grow faster there than a law could tell, or where ``accuracy`` was asked for.
+
+With the assumptions below the errors of the campaign's scenes are covered as ``experiments/README.md`` shows
+(``experiments/error_coverage.py``).
 """
 
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import heyoka as hy
 import numpy as np
 
 from rigidsim.accuracy.error_law import CLOSED_FORM, closed_form_if_any, stable_law
-from rigidsim.accuracy.estimates import margins
-from rigidsim.accuracy.estimates.following import Course, Samples, follow, power_of_time
+from rigidsim.model.projected_invariants import projected_invariants
 from rigidsim.model.system import System
+from rigidsim.scene.transitions import acts_at_moments_alone
 from rigidsim.solve.closed_form import ClosedForm
-from rigidsim.solve.compiled import interruptible
+from rigidsim.solve.compiled import compiled_function, evaluate_rows, interruptible
 from rigidsim.solve.effects.waypoints import SampleTrail, Waypoints
-from rigidsim.solve.precision import Precision, precision_of
+from rigidsim.solve.error_tangents import (
+    Carrier,
+    ErrorTangents,
+    Held,
+    Known,
+    LaneCarrier,
+    Measures,
+    Perturbations,
+    Starts,
+    SteppedCarrier,
+)
+from rigidsim.solve.precision import Precision, Scalar, precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
+from rigidsim.solve.projection import LATE, steps_between
 from rigidsim.solve.stepper import OwnErrors
 from rigidsim.solve.switching.stepper import stepper_of
+from rigidsim.solve.tangents import jacobian_rows
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
 DOUBLE = float(np.finfo(float).eps)
 _LARGEST_EXPONENT = 600.0  # keeps products within doubles
 _VECTORS = {"rates": ("wx", "wy", "wz"), "position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz")}
+
+LAST_BITS = 0.5  # epsilons by which a recorded value is wrong at most because it is rounded
+LABEL = 0.25  # the same for a sample's time: what is recorded belongs to another moment
+AS_LARGE = 4.0  # bound for the error of a position that can't be predicted, over the whole way's size
+UNCERTAIN = 1e-2  # error (rad, or relative to the rates) above which a result counts as lost
+
+SAFETY = 2.75  # factor on the root mean square of three tangents
+PATH = 0.5  # further factor for position and velocity
+COMPARED = 3.0  # factor on the largest difference from a better solution at some samples
+_STABLE = 4.0  # amplification up to which a motion is as stable as the round-off law assumes
+_POWER, _MOST_POWER = 1.5, 2.5  # least and largest power of time by which errors are extrapolated
+_EXPONENTIAL = 5.0  # power of time past which growth counts as exponential
+
+_ANGLES = 4.0  # rounding in Euler angles and their momenta over that in quaternions
+_COARSE = 8.0  # tolerance in epsilons from which a better solution in the next precision shows the error
+_BETTER = 2.0**-10  # factor on the tolerance of that solution
+
+_WHOLE = 100_000  # steps of a run that is followed to its end: some 0.3 s; of a longer one
+_BEGINNING = 0.25  # that many, or this part
+_SWITCHING = 1000, 0.1  # the same with switching surfaces, where each tangent costs as much as the run
+_TOLERANCE = 1e-8  # of steps with tangents, whose motion begins anew at 16 to 32 places of the run
+_BY_ITSELF, _UNROLLED, _OPTIMISED = 1_000, 3_000, 20_000
+"""Steps up to which single steps cost less than code compiled for all motions; from which code pays that
+takes longer to compile, of a low order and of a high one.
+"""
 
 
 @dataclass(frozen=True)
@@ -62,6 +108,73 @@ class Estimate(OwnErrors):
         return self.amplification * math.exp(min(exponent, _LARGEST_EXPONENT))
 
 
+Samples = list[tuple[int, Scalar, np.ndarray, int]]
+"""Index, time, state and chart."""
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A run whose errors are to be followed, in internal units; ``go_on`` ends that when False."""
+
+    prepared: InitialValueProblem
+    start: float
+    end: float
+    steps: int
+    waypoints: Waypoints | None
+    stepper: TaylorStepper | None
+    go_on: Callable[[], bool]
+
+    @property
+    def carried(self) -> bool:
+        """Whether the run carries an attitude."""
+        return self.prepared.system.requirements.attitude
+
+    @property
+    def regular(self) -> bool:
+        """Whether its states are singular nowhere."""
+        return self.prepared.system.formulation.variables.regular
+
+    @property
+    def seconds(self) -> float:
+        """Its length, s."""
+        return math.ldexp(self.end - self.start, self.prepared.system.scaling.time)
+
+    @property
+    def turned(self) -> float:
+        """Radians by which the body turns, at most."""
+        return float(self.prepared.system.rate_bound) * self.seconds
+
+    @property
+    def part(self) -> float:
+        """The part of the run that is followed at least."""
+        if self.prepared.scene.config.integrator.accuracy is not None:
+            return 1.0
+        most, share = _SWITCHING if self.prepared.system.switches else (_WHOLE, _BEGINNING)
+        return min(1.0, max(most / max(self.steps, 1), share))
+
+    @cached_property
+    def system(self) -> System:
+        """What is followed, in double precision: the run's own states, or quaternions in place of Euler
+        angles and their momenta.
+        """
+        system = self.prepared.system
+        if not self.regular:
+            return double_twin(self.prepared)
+        as_it_is = self.prepared.precision.name == "double" and not system.in_two_parts
+        return system if as_it_is else system.rounded(precision_of("double").number)
+
+    @property
+    def shift(self) -> int:
+        """Binary exponent from the run's internal time to the time of ``system``."""
+        return int(self.prepared.system.scaling.time - self.system.scaling.time)
+
+    def with_waypoints(self, samples: Samples) -> Samples:
+        """Samples, and the boundaries of steps that the run remembers, in time."""
+        there = [] if self.waypoints is None else self.waypoints.between(1, self.steps)
+        places: Samples = [(0, one.time, one.state, one.chart) for one in there if one.time < self.end]
+        return sorted([*samples, *places], key=lambda place: float(place[1]))
+
+
 def estimate_errors(
     prepared: InitialValueProblem,
     steps: int,
@@ -70,34 +183,33 @@ def estimate_errors(
     trail: SampleTrail | None = None,
     waypoints: Waypoints | None = None,
     stepper: TaylorStepper | None = None,
-    nearest: float = 1.0,
     go_on: Callable[[], bool] = lambda: True,
 ) -> Estimate | None:
     """Estimate the errors of a run; None if ``go_on`` ended it."""
-    scene, system, epsilon = prepared.scene, prepared.system, float(prepared.precision.epsilon)
+    scene, epsilon = prepared.scene, float(prepared.precision.epsilon)
     if not prepared.has_steps:
         return _everywhere(prepared, CLOSED_FORM * epsilon, "a few roundings of the closed form")
-    start, seconds = float(prepared.clock.start), reached - float(scene.start)
-    end = start + math.ldexp(seconds, -system.scaling.time)
+    start = float(prepared.clock.start)
+    end = start + math.ldexp(reached - float(scene.start), -prepared.system.scaling.time)
     if steps == 0 or end <= start:
         how = "the rounding of the start, which the run didn't leave"
-        return _everywhere(prepared, margins.LAST_BITS * epsilon, how)
-    course = Course(prepared, start, end, steps, waypoints, stepper, nearest, go_on)
+        return _everywhere(prepared, LAST_BITS * epsilon, how)
+    run = _Run(prepared, start, end, steps, waypoints, stepper, go_on)
     samples = [] if trail is None else trail.samples
     form = closed_form_if_any(scene, driven=bool(prepared.python_loads))[0] if samples else None
     if form is not None:
-        seen = _by_closed_form(course, form, samples, seconds)
-    elif len(samples) > 1 and prepared.law_tolerance >= margins.COARSE * DOUBLE:
-        seen = _by_better_solution(course, course.with_waypoints(samples), precision_of("double"), seconds)
-    elif len(samples) > 1 and prepared.law_tolerance >= margins.COARSE * epsilon:
-        seen = _by_better_solution(course, samples, prepared.precision, seconds)
+        seen = _by_closed_form(run, form, samples)
+    elif len(samples) > 1 and prepared.law_tolerance >= _COARSE * DOUBLE:
+        seen = _by_better_solution(run, run.with_waypoints(samples), precision_of("double"))
+    elif len(samples) > 1 and (prepared.law_tolerance >= _COARSE * epsilon or not run.regular):
+        seen = _by_better_solution(run, samples, prepared.precision)
     else:
-        seen = _by_tangents(course, seconds)
-    return _conclusion(course, seen, seconds) if go_on() else None
+        seen = _by_tangents(run)
+    return _conclusion(run, seen) if go_on() else None
 
 
 @dataclass(frozen=True)
-class Seen:
+class _Seen:
     """What was seen of a run's errors.
 
     Attributes:
@@ -113,7 +225,7 @@ class Seen:
     extent: float
     speed: float
     law: float = 0.0
-    how: str = "the motion could not be followed"
+    how: str = ""
     whole: bool = True
     share: float = 1.0
     closed_form: bool = False
@@ -133,149 +245,128 @@ def _over(share: float) -> str:
 
 def _everywhere(prepared: InitialValueProblem, error: float, how: str) -> Estimate:
     """Estimate of a relative error that is the same for all states."""
-    flight = prepared.scene.free_flight
-    return Estimate(
-        error if prepared.system.requirements.attitude else None,
-        error,
-        how,
-        error * _size(prepared.scene.position) if flight else None,
-        error * _size(prepared.scene.velocity) if flight else None,
-    )
+    scene, attitude = prepared.scene, error if prepared.system.requirements.attitude else None
+    if not scene.free_flight:
+        return Estimate(attitude, error, how)
+    return Estimate(attitude, error, how, error * _size(scene.position), error * _size(scene.velocity))
 
 
 # --- by a better solution ---------------------------------------------------------------------------------
 
 
-def _by_closed_form(course: Course, form: ClosedForm, samples: Samples, seconds: float) -> Seen:
+def _by_closed_form(run: _Run, form: ClosedForm, samples: Samples) -> _Seen:
     """Held against the closed form, which rounds only a few times at any time."""
-    prepared, system = course.prepared, double_twin(course.prepared)
+    prepared, system = run.prepared, double_twin(run.prepared)
     precision = precision_of("double") if prepared.precision.narrow else prepared.precision
     times = np.array([time for _, time, _, _ in samples], dtype=precision.scalar)
     there = form.states(system, precision, times, precision.scalar(prepared.clock.start))
-    law = stable_law(prepared.law_tolerance, course.steps, float(prepared.system.rate_bound), seconds)
+    found = _apart(run, system, samples, np.asarray(there))
+    law = stable_law(prepared.law_tolerance, run.steps, run.turned, 1.0)
     law = math.hypot(law, CLOSED_FORM * float(prepared.precision.epsilon))  # of what it is held against
-    found = _apart_at(prepared, system, samples, there)
-    how = "held against the closed form at some samples"
-    return replace(found, extent=found.extent + found.speed * seconds, law=law, how=how, closed_form=True)
+    how, extent = "held against the closed form at some samples", found.extent + found.speed * run.seconds
+    return replace(found, extent=extent, law=law, how=how, closed_form=True)
 
 
-def _by_better_solution(course: Course, samples: Samples, precision: Precision, seconds: float) -> Seen:
-    """Held against a solution at a tighter tolerance, over the part of the run that is followed; over all of
-    it where errors grow faster than any power of time that would be extrapolated.
+def _by_better_solution(run: _Run, samples: Samples, precision: Precision) -> _Seen:
+    """Held against a solution at a tighter tolerance, or in other states, over the part of the run that is
+    followed; over all of it where errors grow faster than any power of time that would be extrapolated.
     """
-    prepared, system = course.prepared, course.system.rounded(precision.number)
-    tolerance = max(prepared.law_tolerance * margins.BETTER, float(precision.epsilon))
-    better = replace(precision, compact=precision.compact or course.steps * course.part < margins.OPTIMISED)
-    unit = precision.scalar(2.0**course.shift)
+    prepared, system = run.prepared, run.system.rounded(precision.number)
+    tolerance = max(prepared.law_tolerance * _BETTER, float(precision.epsilon))
+    better = replace(precision, compact=precision.compact or run.steps * run.part < _OPTIMISED)
+    unit = precision.scalar(2.0**run.shift)
     start = precision.scalar(prepared.clock.start) * unit
     stepper = interruptible(lambda: stepper_of(system, better, precision.scalar(tolerance), start))
-    turned = float(prepared.system.rate_bound) * seconds
     # errors of the tolerance may add up one by one, and what they do to the rates with them: n^2 / 2 of phase
-    law = prepared.law_tolerance * course.steps * math.hypot(1.0, turned / 2)
+    law = prepared.law_tolerance * run.steps * math.hypot(1.0, run.turned / 2)
     there: list[np.ndarray] = []
-    for part in (course.part, 1.0):
-        last = course.start + part * (course.end - course.start)
+    for part in (run.part, 1.0):
+        last = run.start + part * (run.end - run.start)
         for _, time, _, _ in samples[len(there) :]:
             at = precision.scalar(time) * unit
             if float(time) > last and part < 1:
                 break
-            if not course.go_on() or (at > stepper.time and not stepper.to(at)):
-                return replace(_apart_at(prepared, system, samples, there), law=law, whole=False)
+            if not run.go_on() or (at > stepper.time and not stepper.to(at)):
+                lost = _apart(run, system, samples, np.array(there))
+                return replace(lost, law=law, whole=False, how="the motion could not be followed")
             there.append(np.array(stepper.state))
-        found = replace(_apart_at(prepared, system, samples, there), law=law)
-        if len(found.times) > 1 and power_of_time(found.times, found.leading) <= margins.MOST_POWER:
+        found = _apart(run, system, samples, np.array(there))
+        if len(found.times) > 1 and _power_of_time(found.times, found.leading) <= _MOST_POWER:
             break
-    share = 1.0 if len(there) == len(samples) else float(found.times[-1]) / seconds
-    how = "held against a solution at a tighter tolerance at some samples" + _over(share)
-    return replace(found, share=share, how=how)
+    share = 1.0 if len(there) == len(samples) else float(found.times[-1]) / run.seconds
+    than = "at a tighter tolerance"
+    if tolerance >= prepared.law_tolerance:  # it errs, too, as a stable motion in good states does
+        than, law = "in quaternions", stable_law(tolerance, run.steps, run.turned, 1.0)
+        floor = law * found.times / run.seconds
+        found.errors.update(
+            {name: np.maximum(x, floor) for name, x in found.errors.items() if name == "attitude"}
+        )
+    how = f"held against a solution {than} at some samples{_over(share)}"
+    return replace(found, law=law, share=share, how=how)
 
 
-def _apart_at(
-    prepared: InitialValueProblem, system: System, samples: Samples, there: Sequence[np.ndarray] | np.ndarray
-) -> Seen:
-    """How far samples of a run are from states of a better solution in another system, in time."""
+def _apart(run: _Run, system: System, samples: Samples, there: np.ndarray) -> _Seen:
+    """How far samples of a run are from states (n, states) of a better solution in another system."""
+    prepared, samples = run.prepared, samples[: len(there)]
     precision = precision_of("double") if prepared.precision.narrow else prepared.precision
-    here = [_Reader(s, precision) for s in (prepared.system, prepared.system.partner) if s is not None]
-    reference = _Reader(system, precision)
-    found: dict[str, list[float]] = {}
-    for (_, _, state, chart), better in zip(samples, there, strict=False):
-        own, other = (x.astype(precision.scalar) for x in (state, better))
-        for name, error in _apart(here[chart].read(own), reference.read(other)).items():
-            found.setdefault(name, []).append(margins.COMPARED * error)
-    exponent, begin = prepared.system.scaling.time, float(prepared.clock.start)
-    times = [math.ldexp(float(time) - begin, exponent) for _, time, _, _ in samples[: len(there)]]
-    return Seen(
-        np.array(times),
-        {name: np.array(errors) for name, errors in found.items()},
-        _size(prepared.scene.position),
-        _size(prepared.scene.velocity),
-    )
+    begin, exponent = run.start, prepared.system.scaling.time
+    times = np.array([math.ldexp(float(time) - begin, exponent) for _, time, _, _ in samples])
+    errors: dict[str, np.ndarray] = {}
+    if len(samples):
+        charts = [chart for chart in (prepared.system, prepared.system.partner) if chart is not None]
+        states = np.array([state.astype(precision.scalar) for _, _, state, _ in samples])
+        of_charts = [_quantities(chart, precision, states) for chart in charts]
+        better = _quantities(system, precision, there.astype(precision.scalar))
+        for name in of_charts[0].keys() & better.keys():
+            own = np.array([of_charts[chart][name][n] for n, (_, _, _, chart) in enumerate(samples)])
+            errors[name] = COMPARED * _distances(name, own, better[name])
+    return _Seen(times, errors, _size(prepared.scene.position), _size(prepared.scene.velocity))
 
 
-class _Reader:
-    """Quantities that the states of a system stand for, compiled once."""
-
-    def __init__(self, system: System, precision: Precision) -> None:
-        self._system, attitude = system, system.mechanics.attitude
-        self._function = None
-        self._places: list[int] = []
-        read = [] if attitude is None else attitude.quaternion or attitude.variables  # else a direction
-        if all(x in system.variables for x in read):
-            self._places = [system.variables.index(x) for x in read]
-        elif attitude is not None:
-            options = precision.options
-            self._function = hy.cfunc(attitude.quaternion, system.variables, compact_mode=True, **options)
-
-    def read(self, state: np.ndarray) -> dict[str, np.ndarray]:
-        """The quaternion (4,), and vectors in SI as the nearest doubles and their residuals, (2, 3)."""
-        found: dict[str, np.ndarray] = {}
-        if self._function is not None:
-            found["attitude"] = np.array(self._function(state))
-        elif self._places:
-            found["attitude"] = state[self._places]
-        for name, of in _VECTORS.items():
-            if all(state_name in self._system.states for state_name in of):
-                found[name] = _vector(self._system, state, of)
-        return found
-
-
-def _apart(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> dict[str, float]:
-    """Distances in SI; for rates, relative to their size."""
-    found: dict[str, float] = {}
-    for name in one.keys() & other.keys():
-        a, b = one[name], other[name]
-        if name == "attitude":
-            found[name] = _angle(a, b)
-        else:
-            size = float(np.linalg.norm(b[0])) if name == "rates" else 1.0
-            found[name] = float(np.linalg.norm(a[0] - b[0] + (a[1] - b[1]))) / (size or 1.0)
+def _quantities(system: System, precision: Precision, states: np.ndarray) -> dict[str, np.ndarray]:
+    """The quaternion (n, 4), or a direction (n, 3), and vectors (n, 3) in SI, of states (n, states); of a
+    frame that turns with time all at one time, which changes no distance.
+    """
+    places = {
+        name: system.states.index(name) for of in _VECTORS.values() for name in of if name in system.states
+    }
+    read = {
+        name: [system.variables[places[x]] for x in of] for name, of in _VECTORS.items() if of[0] in places
+    }
+    if (attitude := system.mechanics.attitude) is not None:
+        read["attitude"] = attitude.quaternion or attitude.variables
+    every = [x for expressions in read.values() for x in expressions]
+    function = compiled_function(every, system.variables, compact_mode=True, **precision.options)
+    values = evaluate_rows(function, states, times=np.zeros(len(states))).T
+    found, first = {}, 0
+    for name, expressions in read.items():
+        found[name] = values[:, first : first + len(expressions)]
+        first += len(expressions)
+        if name in _VECTORS:
+            sizes = [math.ldexp(1.0, int(system.state_exponents[places[x]])) for x in _VECTORS[name]]
+            found[name] = found[name] * np.array([precision.of_double(x) for x in sizes])
     return found
 
 
-def _vector(system: System, values: np.ndarray, names: tuple[str, ...]) -> np.ndarray:
-    """Three states in SI as the nearest doubles and their residuals, (2, 3)."""
-    places = [system.states.index(name) for name in names]
-    exponents = np.array([system.state_exponents[i] for i in places], dtype=np.int32)
-    high = np.array([float(values[i]) for i in places])
-    low = np.array([float(values[i] - type(values[i])(h)) for i, h in zip(places, high, strict=True)])
-    return np.ldexp(np.array([high, low]), exponents)
-
-
-def _angle(one: np.ndarray, other: np.ndarray) -> float:
-    """Angle between attitudes given as quaternions, up to their sign, or between directions, rad."""
-    if len(one) == 3:
-        return 2 * math.asin(
-            min(math.hypot(*(float(a - b) for a, b in zip(one, other, strict=True))) / 2, 1.0)
-        )
-    opposite = sum(float(a) * float(b) for a, b in zip(one, other, strict=True)) < 0
-    apart = [float(a + b) if opposite else float(a - b) for a, b in zip(one, other, strict=True)]
-    return 4 * math.asin(min(math.hypot(*apart) / 2, 1.0))
+def _distances(name: str, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Distances (n,) in SI, of rates relative to their size, of attitudes angles, subtracted in the numbers'
+    own precision.
+    """
+    apart, size = one - other, other.astype(float)
+    if name != "attitude":
+        whole = np.linalg.norm(size, axis=1) if name == "rates" else np.ones(len(size))
+        return np.asarray(np.linalg.norm(apart.astype(float), axis=1) / np.where(whole > 0, whole, 1.0))
+    if one.shape[1] == 3:
+        return 2 * np.arcsin(np.minimum(np.linalg.norm(apart.astype(float), axis=1) / 2, 1.0))
+    opposite = (one.astype(float) * size).sum(axis=1) < 0
+    apart[opposite] = one[opposite] + other[opposite]
+    return 4 * np.arcsin(np.minimum(np.linalg.norm(apart.astype(float), axis=1) / 2, 1.0))
 
 
 def label_rounding(prepared: InitialValueProblem, seconds: float) -> float:
     """Rounding error of sample times, s."""
     late = max(abs(float(prepared.scene.start)), abs(float(prepared.scene.start) + seconds))
-    return margins.LABEL * float(prepared.precision.epsilon) * late
+    return LABEL * float(prepared.precision.epsilon) * late
 
 
 def _size(vector: object) -> float:
@@ -285,61 +376,168 @@ def _size(vector: object) -> float:
 # --- by tangents ------------------------------------------------------------------------------------------
 
 
-def _by_tangents(course: Course, seconds: float) -> Seen:
+def _by_tangents(run: _Run) -> _Seen:
     """Errors that the rounding of each step makes grow, by tangents that are kicked as it does."""
-    prepared, system = course.prepared, course.system
-    followed = follow(course)
-    spread, scaling = followed.spread, system.scaling
+    prepared, system, scaling = run.prepared, run.system, run.system.scaling
+    epsilon = float(prepared.precision.epsilon)
+    start, end = (math.ldexp(time, run.shift) for time in (run.start, run.end))
+    with _borrowed(run.stepper):
+        tangents = interruptible(lambda: _tangents_of(run, start, end))
+        spread = tangents.follow(start + run.part * (end - start), run.go_on, math.pi / epsilon)
+        followed = ["attitude" if run.carried else "rates"] + ["position"] * bool(
+            spread.largest("distance")[0] > 0
+        )
+        if run.part < 1 and spread.whole[0]:
+            since = spread.along("time") - start
+            if any(_power_of_time(since, spread.along(name)) > _MOST_POWER for name in followed):
+                tangents.follow(end, run.go_on, math.pi / epsilon)
+    share = (float(tangents.time[0]) - start) / (end - start)
     # a looser tolerance may take more steps than the run does
-    taken = max(float(spread.largest("steps")[0]), 1.0)
-    fewer = min(max(course.steps * followed.share / taken, 0.25), 1.0)
-    level = float(prepared.precision.epsilon) * margins.SAFETY * math.sqrt(fewer)
-    begin = math.ldexp(course.start, course.shift)
-    units = {"position": scaling.length, "velocity": scaling.speed}
-    errors = {}
-    for name in ("attitude", "rates", "position", "velocity"):
-        if name in units and "x" not in system.states:
-            continue
-        size = level * (math.ldexp(margins.PATH, units[name]) if name in units else 1.0)
-        errors[name] = size * spread.along(name)
-    if not course.carried:
-        del errors["attitude"]
-    turned = float(prepared.system.rate_bound) * seconds
-    longer = 1 / max(followed.share, 1e-300)
-    # the tangents may take more steps than the run, of short motions above all, and are kicked at the start
-    steps = max(course.steps, round(float(spread.largest("steps")[0]) * longer) + 1)
-    found = Seen(
-        np.ldexp(spread.along("time") - begin, scaling.time),
-        errors,
+    taken = float(spread.largest("steps")[0])
+    fewer = min(max(run.steps * share / max(taken, 1.0), 0.25), 1.0)
+    level = epsilon * SAFETY * math.sqrt(fewer)
+    units = {"position": scaling.length, "velocity": scaling.speed} if "x" in system.states else {}
+    sizes = {"rates": level, **{name: level * math.ldexp(PATH, unit) for name, unit in units.items()}}
+    if run.carried:
+        sizes["attitude"] = level
+    # of short motions above all they may take more, and they are kicked at the start
+    steps = max(run.steps, round(taken / max(share, 1e-300)) + 1)
+    found = _Seen(
+        np.ldexp(spread.along("time") - start, scaling.time),
+        {name: size * spread.along(name) for name, size in sizes.items()},
         math.ldexp(float(spread.largest("distance")[0]), scaling.length),
         math.ldexp(float(spread.largest("speed")[0]), scaling.speed),
-        stable_law(prepared.law_tolerance, steps, turned, 1.0),
+        stable_law(prepared.law_tolerance, steps, run.turned, 1.0),
         whole=bool(spread.whole[0]),
-        share=followed.share,
+        share=share,
     )
     lost = not found.whole or found.leading.max(initial=0.0) >= math.pi
-    over = f", over the first {100 * found.share:.2g} % of the run, after which no digit is left"
+    over = f", over the first {100 * share:.2g} % of the run, after which no digit is left"
     how = "motions near this one, perturbed at random as rounding does"
-    return replace(found, how=how + (over if lost and found.share < 1 else _over(found.share)))
+    return replace(found, how=how + (over if lost and share < 1 else _over(share)))
+
+
+@contextmanager
+def _borrowed(stepper: TaylorStepper | None) -> Iterator[None]:
+    """Use a run's stepper inside the block without leaving a trace."""
+    if stepper is None:
+        yield
+        return
+    log = stepper.log
+    mark, found, muted = stepper.mark(), list(log.found), log.muted
+    log.muted = True
+    try:
+        yield
+    finally:
+        log.muted, log.found[:] = muted, found
+        stepper.back_to(mark)
+
+
+def _tangents_of(run: _Run, start: float, end: float) -> ErrorTangents:
+    prepared, system, precision = run.prepared, run.system, run.prepared.precision
+    measures, known = Measures(system), None
+    if system.switches or run.steps < _BY_ITSELF:
+        own = run.stepper if system is prepared.system else None
+        double = replace(precision_of("double"), compact=True)
+        stepper = own or stepper_of(system, double, None, double.scalar(start))
+        carrier: Carrier = SteppedCarrier(stepper, start, end, run.steps)
+    else:
+        carrier = LaneCarrier(system, _TOLERANCE, compact=run.steps * run.part < _UNROLLED)
+        there = run.waypoints.between(1, run.steps) if run.waypoints is not None and run.regular else []
+        if there:
+            states = np.array([one.state for one in there])[:, :, None]
+            known = Known(np.ldexp([[one.time] for one in there], run.shift), states)
+    units = [[math.ldexp(1.0, int(system.state_exponents[place]))] for place in measures.places["rates"]]
+    starts = Starts(
+        np.array([[float(x)] for x in system.initial]),
+        np.array([start]),
+        np.array([end]),
+        np.array([float(run.steps)]),
+        np.array(units).reshape(-1, 1),
+        np.zeros((0, 1)),
+    )
+    errors = plain_perturbations(system, prepared.law_tolerance / float(precision.epsilon))
+    if prepared.system.clocked and acts_at_moments_alone(prepared.scene):
+        errors = replace(errors, clock=0.0)
+    if not run.regular:
+        errors = replace(errors, own=errors.own * _ANGLES)
+    return ErrorTangents(
+        carrier,
+        measures,
+        starts,
+        errors,
+        float(precision.epsilon),
+        rounded=np.array([precision.exact(precision.number(x)) != x for x in system.initial]),
+        known=known,
+        held=_held(run),
+    )
+
+
+def _held(run: _Run) -> Held | None:
+    """What the run projects of its invariants."""
+    prepared, system = run.prepared, run.system
+    projected = projected_invariants(system)[0] if prepared.holds_invariants else []
+    if not projected:
+        return None
+    late = prepared.holds_late
+    rows = jacobian_rows([one.expression for one in projected], system.variables)
+    every = [row.get(i, hy.expression(0.0)) for row in rows for i in range(len(system.states))]
+    function = compiled_function(every, system.variables, compact_mode=True, fp_type=float)
+    # what is between corrections is off by k / sqrt 12 steps, of which the part over the ends is taken back
+    between = round(steps_between(prepared.precision, late=late) / math.sqrt(12))
+
+    def gradients(state: np.ndarray) -> np.ndarray:
+        return np.asarray(function(np.ascontiguousarray(state))).reshape(len(rows), -1)
+
+    part = min(LATE / run.steps, 1.0) if late else 0.0
+    return Held(gradients, math.ldexp(run.start + part * (run.end - run.start), run.shift), between)
+
+
+_OF_SERIES = 2.0
+"""Rounding of the arguments over that of time, both as errors of the time: the direction of the Moon in
+single precision is wrong by 1.5e-4 rad (root mean square, 1973 to 1982), where time is by half of that.
+"""
+_WITHIN_MONTH = 4.0
+"""Steps at least in a quarter of the Moon's month, as long as the body turns no slower than it revolves."""
+
+
+def plain_perturbations(system: System, loose: float) -> Perturbations:
+    """Errors of a step in quaternions or rates, at a tolerance in epsilons."""
+    loads = system.plan.loads
+    ahead = max((load.seconds_ahead for load in loads), key=abs, default=0.0)
+    plain = Perturbations(ahead=math.ldexp(ahead, -system.scaling.time))
+    plain = replace(plain, own=plain.own * loose)
+    if not any(load.of_time for load in loads):
+        return plain
+    return replace(plain, clock=_OF_SERIES * plain.clock, together=_WITHIN_MONTH)
 
 
 # --- conclusion -------------------------------------------------------------------------------------------
 
 
-def _conclusion(course: Course, seen: Seen, seconds: float) -> Estimate:
+def _power_of_time(times: np.ndarray, errors: np.ndarray) -> float:
+    """Power of time with which errors grew over the last three quarters."""
+    largest = np.maximum.accumulate(errors)
+    early = int(np.searchsorted(times, times[-1] / 4))
+    if not (0 < largest[early] < math.inf and times[early] < times[-1] and largest[-1] < math.inf):
+        return math.inf if largest[-1] > 0 else 0.0
+    return float(math.log(largest[-1] / largest[early]) / math.log(times[-1] / times[early]))
+
+
+def _conclusion(run: _Run, seen: _Seen) -> Estimate:
     """Errors at the end from those along the beginning, with the rounding of samples and of their times."""
-    prepared, times = course.prepared, seen.times
-    carried, flight = course.carried, "position" in seen.errors
-    rate, label = float(prepared.system.rate_bound), label_rounding(prepared, seconds)
-    bits = margins.LAST_BITS * float(prepared.precision.epsilon)
+    prepared, times, carried = run.prepared, seen.times, run.carried
+    flight = "position" in seen.errors
+    rate, label = float(prepared.system.rate_bound), label_rounding(prepared, run.seconds)
+    bits = LAST_BITS * float(prepared.precision.epsilon)
     if not len(times):
         unknown = 0.0 if seen.whole else math.pi
         return Estimate(unknown if carried else None, unknown, "the motion could not be followed")
     longer = 1 / min(max(seen.share, 1e-300), 1.0)
 
     def beyond(name: str) -> float:
-        power = power_of_time(times, seen.errors[name]) if longer > 1 else 0.0
-        return float(longer ** min(max(power, margins.POWER), margins.MOST_POWER))
+        power = _power_of_time(times, seen.errors[name]) if longer > 1 else 0.0
+        return float(longer ** min(max(power, _POWER), _MOST_POWER))
 
     lead = "attitude" if carried else "rates"
     turned = beyond(lead)
@@ -352,17 +550,14 @@ def _conclusion(course: Course, seen: Seen, seconds: float) -> Estimate:
 
     leading = at_end(lead, 1.0, sys.float_info.max, rate)
     amplification = leading / seen.law if seen.law > 0 else 1.0
-    growth, horizon = 0.0, None
-    if not seen.closed_form:
-        growth, horizon = exponential_growth(times, seen.errors[lead])
+    growth, horizon = (0.0, None) if seen.closed_form else _exponential_growth(times, seen.errors[lead])
     extent, speed = seen.extent, seen.speed
-    place = at_end("position", extent, margins.AS_LARGE * extent, speed) if flight else None
     return Estimate(
         attitude=min(leading, math.pi) if carried else None,
         rates=at_end("rates", 1.0, 2.0, rate) if "rates" in seen.errors else 0.0,
-        position=place,
-        velocity=at_end("velocity", speed, margins.AS_LARGE * speed) if flight else None,
-        amplification=amplification if amplification > margins.STABLE else 1.0,
+        position=at_end("position", extent, AS_LARGE * extent, speed) if flight else None,
+        velocity=at_end("velocity", speed, AS_LARGE * speed) if flight else None,
+        amplification=amplification if amplification > _STABLE else 1.0,
         growth_rate=growth,
         predictable_seconds=horizon,
         seconds=float(times[-1]),
@@ -372,21 +567,21 @@ def _conclusion(course: Course, seen: Seen, seconds: float) -> Estimate:
     )
 
 
-def exponential_growth(times: np.ndarray, errors: np.ndarray) -> tuple[float, float | None]:
+def _exponential_growth(times: np.ndarray, errors: np.ndarray) -> tuple[float, float | None]:
     """Rate of exponential growth, 1/s, and when digits are gone, seconds after the start; 0 and None if
     growth isn't exponential. Times in s since the start, errors in rad, or relative.
     """
     largest = np.maximum.accumulate(errors)
-    gone = int(np.searchsorted(largest, margins.UNCERTAIN))
+    gone = int(np.searchsorted(largest, UNCERTAIN))
     last = min(gone, len(times) - 1)
-    if last < 2 or power_of_time(times[: last + 1], largest[: last + 1]) < margins.EXPONENTIAL:
+    if last < 2 or _power_of_time(times[: last + 1], largest[: last + 1]) < _EXPONENTIAL:
         return 0.0, None
     early = int(np.searchsorted(times, times[last] / 4))
     if not largest[early] > 0:  # errors begin where a load does: they have not grown from anything
         return 0.0, None
     span, ratio = float(times[last] - times[early]), min(largest[last], 1e300) / largest[early]
-    rate = (math.log(ratio) - margins.POWER * math.log(times[last] / times[early])) / span
+    rate = (math.log(ratio) - _POWER * math.log(times[last] / times[early])) / span
     seconds = float(times[last])
     if rate > 0 and gone >= len(times):
-        seconds += math.log(margins.UNCERTAIN / largest[last]) / rate
+        seconds += math.log(UNCERTAIN / largest[last]) / rate
     return max(rate, 0.0), seconds

@@ -9,15 +9,22 @@ samples, which costs no more than tangents would, and is no question of chance.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from rigidsim.accuracy.estimates import margins
-from rigidsim.accuracy.estimates.following import plain_perturbations
+from rigidsim.accuracy.estimates.estimate import (
+    AS_LARGE,
+    COMPARED,
+    LABEL,
+    LAST_BITS,
+    PATH,
+    SAFETY,
+    UNCERTAIN,
+    plain_perturbations,
+)
 from rigidsim.solve.batch.family import Family, Numbers
-from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem
 from rigidsim.solve.batch.run import BatchBlock
 from rigidsim.solve.error_tangents import (
     TANGENTS,
@@ -29,6 +36,7 @@ from rigidsim.solve.error_tangents import (
     beside,
     timed,
 )
+from rigidsim.solve.lanes import BatchEngine, BatchSystem
 
 _TOLERANCE = 1e-8  # of lanes, which begin anew at some of the samples
 _BEGUN_ANEW = 16  # times at most
@@ -57,7 +65,7 @@ class MemberErrors:
     @property
     def uncertain(self) -> np.ndarray:
         """Mask of the members whose digits are gone."""
-        return (self.rates if self.attitude is None else self.attitude) > margins.UNCERTAIN
+        return (self.rates if self.attitude is None else self.attitude) > UNCERTAIN
 
 
 class MemberEstimates:
@@ -123,10 +131,10 @@ class MemberEstimates:
         )
         by_chance = self._by_chance
         spread = self._followed(block, some, starts) if by_chance else self._compared(block, some, starts)
-        label = margins.LABEL * self._epsilon * np.maximum(abs(begin_seconds), np.abs(seconds))
+        label = LABEL * self._epsilon * np.maximum(abs(begin_seconds), np.abs(seconds))
         pace = numbers.doubles(system.rate_bound)[places]
-        level = margins.SAFETY * self._epsilon if by_chance else margins.COMPARED
-        last, path = margins.LAST_BITS * self._epsilon, margins.PATH if by_chance else 1.0
+        level = SAFETY * self._epsilon if by_chance else COMPARED
+        last, path = LAST_BITS * self._epsilon, PATH if by_chance else 1.0
         with np.errstate(over="ignore"):
 
             def at_end(name: str, size: np.ndarray | float, most: np.ndarray | float) -> np.ndarray:
@@ -138,8 +146,8 @@ class MemberEstimates:
             rates = at_end("rates", last, 2.0)
             extent, fastest = spread.largest("distance"), spread.largest("speed")
             moved = last * extent + np.ldexp(label, -units) * fastest
-            position = path * at_end("position", moved, margins.AS_LARGE * extent)
-            velocity = path * at_end("velocity", last * fastest, margins.AS_LARGE * fastest)
+            position = path * at_end("position", moved, AS_LARGE * extent)
+            velocity = path * at_end("velocity", last * fastest, AS_LARGE * fastest)
         length, speed = (numbers.whole_numbers(e)[places] for e in (scaling.length, scaling.speed))
         return np.array([attitude, rates, np.ldexp(position, length), np.ldexp(velocity, speed)])
 
@@ -165,8 +173,8 @@ class MemberEstimates:
     def _followed(self, block: BatchBlock, some: np.ndarray, starts: Starts) -> Spread:
         epsilon, read = self._epsilon, starts.parameters[self._traced.in_equations]
         carrier = MemberCarrier(self._lanes, read, starts)
-        plain = plain_perturbations(self._prepared.system)
-        errors = replace(plain, own=plain.own * max(self._prepared.effective_tolerance / epsilon, 1.0))
+        loose = max(self._prepared.effective_tolerance / epsilon, 1.0)
+        errors = plain_perturbations(self._prepared.system, loose)
         rows = np.unique(np.linspace(0, len(block.moments) - 1, _BEGUN_ANEW + 2).astype(int)[1:-1])
         times, states = (
             block.moments[np.ix_(rows, some)],

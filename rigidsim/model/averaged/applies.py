@@ -5,7 +5,7 @@ Averaging over the rotation fails where a combination i g + j l + k n of the bod
 harmonic's part U of the potential energy the angle obeys phi'' = -(c U) sin phi with c about (|i| + |j|)^2
 over the least moment, so that within 2 sqrt(c U) of zero it librates (Chirikov 1979), and it swings the
 momentum by U / (L nu) elsewhere. Resonances may be too slow for the windows of a run over which its error is
-measured (``rigidsim.accuracy.models.modelling``); whatever else makes an average bad is seen there.
+measured (``rigidsim.accuracy.modelling``); whatever else makes an average bad is seen there.
 """
 
 import math

@@ -17,7 +17,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model import rotations
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.formulations.euler_angles import ANGLES, euler_states
-from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Rounding, formulates
+from rigidsim.model.formulations.formulation import Formulation, ModelPlan, formulates
 from rigidsim.model.inertia import ConstantInertia
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
@@ -38,7 +38,6 @@ class Canonical(Formulation):
     """Angles and momenta, of which the body rates are functions."""
 
     carries_rates = False
-    rounding = Rounding.MOMENTA
 
     def __init__(self, sequence: str) -> None:
         self.sequence = sequence

@@ -19,7 +19,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model import rotations
-from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Rounding, formulates
+from rigidsim.model.formulations.formulation import Formulation, ModelPlan, formulates
 from rigidsim.model.load import Load
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
@@ -36,8 +36,6 @@ ANGLES = ["phi", "theta", "psi"]
 @formulates(FORMULATIONS["euler_angles"])
 class EulerAngles(Formulation):
     """The angles of one sequence, with the same motion in the partner sequence, unless this is that one."""
-
-    rounding = Rounding.ANGLES
 
     def __init__(self, sequence: str, partner: EulerAngles | None = None) -> None:
         self.sequence, self.partner = sequence, partner

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import Enum
 from typing import Any, ClassVar, TypeVar
 
 import heyoka as hy
@@ -32,14 +31,6 @@ from rigidsim.scene.surfaces import Surfaces
 
 class Unsuited(ValueError):
     """A formulation doesn't apply to a scene; the message goes on from ``given "name", but``."""
-
-
-class Rounding(Enum):
-    """How the states' rounding at each step moves the motion; the laws are in ``rigidsim.accuracy``."""
-
-    PLAIN = "relative to the states' own sizes"
-    ANGLES = "angles lose digits near their singularity"
-    MOMENTA = "angles and their momenta lose digits near their singularity, and in forming the rates"
 
 
 @dataclass(frozen=True)
@@ -87,7 +78,6 @@ class Formulation:
         carries_rates: whether the angular velocity is carried as three states with units of their own.
         resolves_rotation: whether every rotation is followed, rather than averaged over. A motion averaged
             over has an error of its model, which is measured beside it.
-        rounding: how the states' rounding moves the motion.
         twin: formulation in which questions about the motion itself, such as its stability, are asked in
             double precision; None for this one.
         sequence: sequence of the Euler angles that are states; empty for other states.
@@ -101,7 +91,6 @@ class Formulation:
     variables: ClassVar[Variables]
     carries_rates: ClassVar[bool] = True
     resolves_rotation: ClassVar[bool] = True
-    rounding: ClassVar[Rounding] = Rounding.PLAIN
     twin: ClassVar[str | None] = DEFAULT_FORMULATION
     sequence: str = ""
     partner: Formulation | None = None

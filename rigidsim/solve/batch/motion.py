@@ -11,10 +11,10 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem, LaneResults
 from rigidsim.solve.batch.tracing import TracedSystem
 from rigidsim.solve.compiled import compiled_function, evaluate_rows
 from rigidsim.solve.events import BESIDE, STATES, TIMES, exponents_of
+from rigidsim.solve.lanes import BatchEngine, BatchSystem, LaneResults
 
 _BITS = 53
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from rigidsim.model.tangents import GROWTH
 from rigidsim.solve.batch.family import Family, Numbers
-from rigidsim.solve.batch.lanes import LaneResults, recommended_width
 from rigidsim.solve.batch.motion import BatchMotion
 from rigidsim.solve.batch.tracing import TracedSystem
 from rigidsim.solve.compiled import compiled_function, evaluate_rows
+from rigidsim.solve.lanes import LaneResults, recommended_width
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from rigidsim.accuracy.models.modelling import measure_modelling
-from rigidsim.accuracy.models.side_by_side import Unmeasured
+from rigidsim.accuracy.modelling import Unmeasured, measure_modelling
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load import loads_of
 from rigidsim.scene.choices import FULL, REDUCED

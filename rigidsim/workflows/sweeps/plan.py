@@ -11,7 +11,7 @@ from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import build_scene
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.dataset import dataset_variables, refuse_taken_names
-from rigidsim.solve.batch.lanes import recommended_width
+from rigidsim.solve.lanes import recommended_width
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.summary_parts import SummaryPart
 from rigidsim.store.sweeps.dataset import OF_FITS, RESERVED, SUFFIXES
