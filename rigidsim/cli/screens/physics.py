@@ -9,9 +9,6 @@ from rigidsim.workflows.physics.table import ComparedModel, PhysicsPlan
 
 _HEADS = ["left out", "largest", "rms", "operations", "steps", "", "what it is"]
 
-_MOST_TRIED = 3
-"""Of the models that were run and are beyond the error: the nearest."""
-
 
 def print_physics(plan: PhysicsPlan) -> None:
     """Print the result of ``rigidsim plan --physics``."""
@@ -41,20 +38,9 @@ def print_physics(plan: PhysicsPlan) -> None:
     without = ", ".join(least.left_out) or "nothing: every effect is required"
     on.line("least", f"within {arcsec_text(plan.error_arcsec)} leave out {without}", "bold")
     on.line("", _told(least))
-    if plan.cheapest is not None:
-        left_out = ", ".join(plan.cheapest.left_out) or "nothing"
-        on.line(
-            "cheaper", f"with more effects, but fewer steps: leave out {left_out}; {_told(plan.cheapest)}"
-        )
-    several = [x for x in plan.tried if len(x.left_out) > 1 and not x.within]
-    for model in sorted(several, key=lambda x: x.largest_arcsec)[:_MOST_TRIED]:
+    for model in plan.tried[:-1]:
         on.line("tried", f"without {', '.join(model.left_out)}: {_told(model)}")
-    ran = len(plan.tried)
-    on.line(
-        "models",
-        f"{plan.models:,} in all: {ran:,} run, {plan.ruled_out:,} predicted to be too inaccurate, "
-        f"{plan.models - ran - plan.ruled_out:,} skipped as no cheaper",
-    )
+    on.line("", "the least found; another set of effects may be smaller or cheaper")
     spent = [row.cpu_seconds for row in plan.effects]
     ends = [span_text(min(spent), 2), span_text(max(spent), 2)]
     whole = plan.full.cpu_seconds + sum(spent) + sum(x.cpu_seconds for x in plan.tried if len(x.left_out) > 1)

@@ -105,7 +105,6 @@ class Models:
     tuning: Tuning | None
     told: Callable[[str], None]
     _done: dict[tuple[str, ...], ModelRun] = field(default_factory=dict)
-    _sizes: dict[tuple[str, ...], int] = field(default_factory=dict)
     _full: list[np.ndarray] = field(default_factory=list)
 
     @cached_property
@@ -147,17 +146,6 @@ class Models:
         estimate = [] if not left_out else ["output.estimate=false"]
         return without(self.experiment, left_out).having([f'name="{name}"', *estimate])
 
-    def operations(self, codes: Collection[str]) -> int:
-        """Those of a model's equations.
-
-        Raises:
-            ConfigError: the config has no meaning without all of these effects.
-        """
-        key = tuple(outermost(self.effects, codes))
-        if key not in self._sizes:
-            self._sizes[key] = size_of(prepare(self.model(key)))
-        return self._sizes[key]
-
     def run(self, codes: Collection[str]) -> ModelRun:
         """A model's run: done before, gone on with, or begun."""
         key = tuple(outermost(self.effects, codes))
@@ -169,13 +157,10 @@ class Models:
         model = self.model(codes)
         done = self._settled(model)
         if not isinstance(done.outcome, Summary) or done.status != "finished":
-            what = (
+            raise RunFolderError(
                 f"{done.place}: ended as {done.status} ({done.summary.get('message', '')}), and models are "
-            )
-            what += (
                 "compared over the whole span; give it the time or steps that it needs, and call this again"
             )
-            raise RunFolderError(what)
         with done.dataset as dataset:
             found = parts_of(dataset, self.compared, np.arange(dataset.sizes["time"]))
         if not codes:
@@ -187,7 +172,7 @@ class Models:
             apart(self._full, found),
             cost.steps,
             cost.cpu_seconds,
-            self.operations(codes),
+            size_of(prepare(model)),
             done.outcome.accuracy.estimated_attitude_error,
         )
 
@@ -201,8 +186,10 @@ class Models:
                 self.told(f"{name}: goes on")
             return resume(folder.path, tuning=self.tuning, progress=False)
         if begun and not self.force:
-            what = f"{folder.path}: holds the run of another config; {FORCE} replaces it, another {OUT} puts "
-            raise RunFolderError(what + "these runs elsewhere")
+            raise RunFolderError(
+                f"{folder.path}: holds the run of another config; {FORCE} replaces it, another {OUT} puts "
+                "these runs elsewhere"
+            )
         self.told(f"{name}: begun")
         return run(model, out=self.folder, force=begun, tuning=self.tuning, progress=False)
 

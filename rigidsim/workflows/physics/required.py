@@ -1,11 +1,15 @@
-"""``plan --physics ERROR``: run the full model and those without an effect, and name the least one."""
+"""``plan --physics ERROR``: run the full model and those without an effect, and name the least one found."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from decimal import Decimal
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from rigidsim.errors import ConfigError, Problem, Remedy
 from rigidsim.scene.config import Experiment
@@ -15,9 +19,8 @@ from rigidsim.session.session import Tuning
 from rigidsim.solve.problem import prepare
 from rigidsim.store.outputs import refuse_inputs, refuse_loss, writing
 from rigidsim.workflows.physics.beyond import averaged_levels, geodetic
-from rigidsim.workflows.physics.effects import missing_from, without
+from rigidsim.workflows.physics.effects import missing_from, outermost, without
 from rigidsim.workflows.physics.models import ModelRun, Models
-from rigidsim.workflows.physics.search import Candidates, search
 from rigidsim.workflows.physics.table import (
     ARCSEC,
     ComparedModel,
@@ -30,7 +33,6 @@ from rigidsim.workflows.read import Given, as_experiment
 FIGURE = "ladder.png"
 _LONGEST = 94  # of a name that becomes the least model's
 _WHERE = Remedy("--physics", "error")
-_CHEAPER = 0.95  # of the least model's cost, from which on one with more effects is told
 _UNCERTAIN = 0.1  # of the error, up to which rounding doesn't matter
 
 
@@ -44,7 +46,7 @@ def required_physics(
     told: Callable[[str], None] = lambda _: None,
     tuning: Tuning | None = None,
 ) -> PhysicsPlan:
-    """Measure what each effect of a scene is worth, and find the least model within an error.
+    """Measure what each effect of a scene is worth, and find a least model within an error.
 
     Args:
         experiment: as for ``rigidsim.run``.
@@ -71,7 +73,12 @@ def required_physics(
         refuse_loss([target], experiment.files, force=force)
     prepared = prepare(experiment)
     models = Models(experiment, folder, force, tuning, told)
-    _refuse_without_effects(experiment, models)
+    if not models.effects:
+        what = (
+            "has neither loads nor rotors, elasticity or a core, so that nothing can be left out: the body "
+        )
+        what += "rotates freely; plan without --physics shows what is integrated"
+        raise ConfigError(Problem("config", what), experiment.source)
     absent = [UnassessedEffect(what=what, why=why) for what, why in missing_from(experiment.config)]
     full = models.run([])
     alone: dict[str, ModelRun] = {}
@@ -79,36 +86,35 @@ def required_physics(
         try:
             alone[code] = models.run([code])
         except ConfigError as problem:
-            why = "can't be left out by itself: " + "; ".join(map(_in_short, problem.problems))
+            # without the names that are allowed: numbers of tables are those of the smaller config
+            reasons = "; ".join(one.what.partition("; allowed: ")[0] for one in problem.problems)
+            why = f"can't be left out by itself: {reasons}"
             absent.append(UnassessedEffect(what=f"{effect.words} ({code})", why=why))
     if not alone:
         raise ConfigError(Problem("config", "no effect can be left out by itself; nothing to compare"))
     averaged, why_not = averaged_levels(experiment)
-    absent += why_not
-    if beyond := geodetic(prepared.scene):
-        absent.append(beyond)
-    parts = {code: models.effects[code].parts_of for code in alone}
-    found = search(Candidates(parts, full, alone, most), lambda codes: _run(models, codes))
-    tried = [_compared(models, codes, sums, most) for codes, sums in found.tried if _run(models, codes)]
-    least = next(x for x in tried if x.left_out == found.least)
-    gone = {code for code in parts if code in found.least or set(parts[code]) & set(found.least)}
-    worths = [_worth(models, code, done, code not in gone) for code, done in alone.items()]
-    config = experiment.config
+    beyond = geodetic(prepared.scene)
+    tried = _tried(models, alone, most)
+    least, config = tried[-1], experiment.config
+    gone = {code for code in alone if {code, *models.effects[code].parts_of} & {*least.left_out}}
+    effects = [
+        EffectWorth(
+            code=code, words=models.effects[code].words, required=code not in gone, **_measured(done)
+        )
+        for code, done in alone.items()
+    ]  # fmt: skip
     result = PhysicsPlan(
         name=config.name,
         error_arcsec=most * ARCSEC,
         compared=models.compared,
         span_s=float(prepared.scene.samples.last - prepared.scene.start),
         samples=len(full.rotations),
-        full=_compared(models, [], 0.0, most),
+        full=_compared(full, [], 0.0, most),
         least=least,
-        cheapest=_cheaper(tried, least),
-        effects=sorted(worths, key=lambda x: -x.largest_arcsec),
+        effects=sorted(effects, key=lambda x: -x.largest_arcsec),
         averaged=averaged,
-        not_assessed=absent,
+        not_assessed=[*absent, *why_not, *([beyond] if beyond else [])],
         tried=tried,
-        models=found.models,
-        ruled_out=found.ruled_out,
         uncertainty_arcsec=None if full.uncertainty is None else full.uncertainty * ARCSEC,
         warnings=_warnings(full, most),
         folder=str(folder),
@@ -116,12 +122,43 @@ def required_physics(
         written=None if target is None else str(target),
     )
     if target is not None:
-        made = least_config(experiment, found.least)
+        made = least_config(experiment, least.left_out)
         made = made.having([f'name="{config.name[:_LONGEST]}-least"'])  # beside the full one's run
         with writing(target) as new:
             new.write_text(_comments(result) + made.text, encoding="utf-8")
-    _draw(result, folder / FIGURE)
+    from rigidsim.look.figures.ladder import save_ladder  # which loads matplotlib
+
+    with writing(folder / FIGURE) as temporary:
+        save_ladder(result.as_dict(), temporary)
     return result
+
+
+def _tried(models: Models, alone: Mapping[str, ModelRun], most: float) -> list[ComparedModel]:
+    """Models that were run in search of the least one, which is the last.
+
+    Effects are left out from the least worth on, as long as the sum of what they do, as rotation vectors at
+    every sample, is within the error (rad). The model is run; while it is beyond the error, its effect worth
+    most is put back.
+    """
+
+    def summed(codes: Sequence[str]) -> float:
+        total = sum((alone[code].rotations for code in codes), np.zeros_like(models.run([]).rotations))
+        return float(np.linalg.norm(total, axis=1).max())
+
+    left_out: list[str] = []
+    before = None
+    while before != left_out:  # a later effect may make room for an earlier one
+        before = left_out
+        for code in sorted(alone, key=lambda code: alone[code].largest):
+            more = outermost(models.effects, [*left_out, code])
+            left_out = more if set(more) <= set(alone) and summed(more) <= most else left_out
+    tried = []
+    while not tried or not tried[-1].within:
+        with suppress(ConfigError):  # a config that has no meaning without all of these
+            tried.append(_compared(models.run(left_out), left_out, summed(left_out), most))
+        worst = max(left_out, key=lambda code: alone[code].largest, default="")
+        left_out = [code for code in left_out if code != worst]
+    return tried
 
 
 def least_config(experiment: Experiment, codes: Sequence[str]) -> Experiment:
@@ -160,60 +197,22 @@ def _asked(error: str | float | Decimal) -> float:
     return value
 
 
-def _in_short(problem: Problem) -> str:
-    """A problem without the names that are allowed; numbers of tables are those of the smaller config."""
-    return problem.what.partition("; allowed: ")[0]
+def _measured(done: ModelRun) -> dict[str, Any]:
+    return {
+        "rms_arcsec": done.rms * ARCSEC,
+        "largest_arcsec": done.largest * ARCSEC,
+        "operations": done.operations,
+        "steps": done.steps,
+        "cpu_seconds": done.cpu_seconds,
+        "run": str(done.folder),
+    }
 
 
-def _refuse_without_effects(experiment: Experiment, models: Models) -> None:
-    if models.effects:
-        return
-    what = "has neither loads nor rotors, elasticity or a core, so that nothing can be left out: the body "
-    what += "rotates freely; plan without --physics shows what is integrated"
-    raise ConfigError(Problem("config", what), experiment.source)
-
-
-def _run(models: Models, codes: Sequence[str]) -> ModelRun | None:
-    """A model's run; None if the config has no meaning without all of these effects."""
-    try:
-        return models.run(codes)
-    except ConfigError:
-        return None
-
-
-def _compared(models: Models, codes: Sequence[str], expected: float, most: float) -> ComparedModel:
-    done = models.run(codes)
+def _compared(done: ModelRun, codes: Sequence[str], expected: float, most: float) -> ComparedModel:
     return ComparedModel(
-        left_out=list(codes),
-        rms_arcsec=done.rms * ARCSEC,
-        largest_arcsec=done.largest * ARCSEC,
-        expected_arcsec=expected * ARCSEC,
-        operations=done.operations,
-        steps=done.steps,
-        cost=done.cost,
-        cpu_seconds=done.cpu_seconds,
-        within=done.largest <= most,
-        run=str(done.folder),
-    )
-
-
-def _cheaper(tried: Sequence[ComparedModel], least: ComparedModel) -> ComparedModel | None:
-    within = [model for model in tried if model.within and model.cost < _CHEAPER * least.cost]
-    return min(within, key=lambda model: model.cost, default=None)
-
-
-def _worth(models: Models, code: str, done: ModelRun, required: bool) -> EffectWorth:
-    return EffectWorth(
-        code=code,
-        words=models.effects[code].words,
-        rms_arcsec=done.rms * ARCSEC,
-        largest_arcsec=done.largest * ARCSEC,
-        cpu_seconds=done.cpu_seconds,
-        steps=done.steps,
-        operations=done.operations,
-        required=required,
-        run=str(done.folder),
-    )
+        left_out=list(codes), expected_arcsec=expected * ARCSEC, cost=done.cost, within=done.largest <= most,
+        **_measured(done),
+    )  # fmt: skip
 
 
 def _comments(plan: PhysicsPlan) -> str:
@@ -237,10 +236,3 @@ def _warnings(full: ModelRun, most: float) -> list[str]:
         return []
     what = f"the full model's attitude is uncertain by {full.uncertainty * ARCSEC:.1e} arcsec itself, by "
     return [what + "rounding: ask for a larger error, or for more precision"]
-
-
-def _draw(result: PhysicsPlan, path: Path) -> None:
-    from rigidsim.look.figures.ladder import save_ladder
-
-    with writing(path) as temporary:
-        save_ladder(result.as_dict(), temporary)

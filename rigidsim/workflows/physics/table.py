@@ -71,18 +71,13 @@ class ComparedModel(SummaryPart):
 
 
 class PhysicsPlan(SummaryPart):
-    """What each effect of a scene is worth, and the least model within an error.
+    """What each effect of a scene is worth, and the least model found within an error.
 
     Attributes:
         error_arcsec: the error asked for.
-        cheapest: of the models that were run and are within the error one with more effects than the least
-            one that costs less all the same, since it takes fewer steps; None for none.
         effects: the most worth first.
         compared: the variable that angles are of: quaternion, or the axis of an average.
-        tried: the models that were run in search of the least one.
-        models: number of all models that leave out some of the effects.
-        ruled_out: how many that leave out more than the least one, or might be cheaper, weren't run, because
-            what is known of their effects is beyond the error.
+        tried: the models that were run in search of the least one, which is the last.
         uncertainty_arcsec: of the full model's attitude at the end by rounding; None if not estimated.
         written: file of the least model's config; None if none was asked for.
     """
@@ -94,13 +89,10 @@ class PhysicsPlan(SummaryPart):
     samples: int
     full: ComparedModel
     least: ComparedModel
-    cheapest: ComparedModel | None
     effects: list[EffectWorth]
     averaged: list[AveragedLevel]
     not_assessed: list[UnassessedEffect]
     tried: list[ComparedModel]
-    models: int
-    ruled_out: int
     uncertainty_arcsec: float | None
     warnings: list[str]
     folder: str
