@@ -1,7 +1,8 @@
 """Known frequencies of a scene, from its config, with which spectral lines are labelled.
 
 Free bodies and heavy tops have theirs from the closed form (elliptic functions), orbits from their elements,
-ephemerides from mean elements, librations and a fluid core from the linearised equations.
+ephemerides from mean elements, librations and a fluid core from the linearised equations. A core adds the
+free core nutation to the wobble (Poincare 1910; Sasao, Okubo & Saito 1980).
 """
 
 from typing import Any
@@ -12,16 +13,26 @@ from rigidsim.analysis.labels import Known
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import loads_of
 from rigidsim.model.loads.elasticity import Elasticity
-from rigidsim.model.loads.fluid_core import FluidCore
-from rigidsim.scene.arithmetic import Vector, apply, dot, transpose
-from rigidsim.scene.attitude import rotation_matrix
+from rigidsim.model.loads.fluid_core import FluidCore, core_of
+from rigidsim.model.loads.gravity_gradient import GravityGradient
+from rigidsim.model.loads.point_attraction import MovingGradient
+from rigidsim.model.sources import in_body_axes
+from rigidsim.scene.arithmetic import Vector, dot, norm
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.closed_form import find_closed_form
 from rigidsim.solve.closed_form.free import AsymmetricFree, SymmetricFree
 from rigidsim.solve.closed_form.heavy import HeavyTop
-from rigidsim.workflows.free_modes import SYMMETRIC, modes_of_core, spin_change, synchronous_modes
 
-_LIBRATION = 0.08  # relative amount by which a libration of finite amplitude may be slower than a small one
+_LONGITUDE, _AXIS = 0.08, 0.04
+"""Relative amounts by which amplitude, eccentricity and inclination may change librations in longitude, and
+of the figure axis.
+"""
+_SYMMETRIC = 1e-12  # relative difference of two moments, below which a body is symmetric
+_SMALL = 1e-5  # relative change of the frequencies of modes by their own amplitude
+_TORQUES = 0.02  # the same by torques
+_NEAR = 0.3  # of the spin, across it, from which a rotation isn't one about an axis
+_IN_STEP = 0.35  # relative difference of the spin's square from that of a circular orbit at the distance
+_FACING = 0.8  # cosine between a principal axis and the source
 _SPIN = 0.02  # relative amount by which torques may change spin and wobble
 OF_ROTATION = ("spin", "wobble", "free_nutation", "free_core_nutation")
 """Frequencies of the rotation, which an averaged motion lacks."""
@@ -48,7 +59,7 @@ def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
     found = []
     loads = [load for load in loads_of(scene) if load.beside is None]
     elastic = any(isinstance(load, Elasticity) for load in loads)
-    cored = [] if elastic else modes_of_core(scene)
+    cored = [] if elastic else _modes_of_core(scene)
     known = (Elasticity, FluidCore) if cored or elastic else ()
     if carried_beside([load for load in loads if not isinstance(load, known)]):
         return []
@@ -58,10 +69,8 @@ def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
     sources = [load.gradient_source for load in loads]
     if any(source is not None and source.placement.lunisolar for source in sources):
         found += _delaunay(scene)
-    librations = _librations(scene, orbits[0]) if len(orbits) == 1 == len(loads) else []
-    librations = librations or synchronous_modes(
-        scene, next((k.value for k in found if k.name == "Om"), None)
-    )
+    alone = orbits[0] if len(orbits) == 1 == len(loads) else None
+    librations = _librations(scene, alone, next((k.value for k in found if k.name == "Om"), None))
     if cored or elastic:  # whose own distortion changes the wobble
         return found + cored + librations
     return found + (librations or _of_spin(scene))
@@ -117,58 +126,6 @@ def _delaunay(scene: Scene) -> list[Known]:
     return [Known(name, context.mpf(rate) * unit, 0.0, source, error) for name, rate in _DELAUNAY.items()]
 
 
-def _librations(scene: Scene, orbit: Any) -> list[Known]:
-    """Small oscillations about the equilibrium in a circular orbit near which the body starts; none
-    elsewhere.
-    """
-    context = scene.context
-    if not (orbit.circular and orbit.fixed_plane) or scene.free_flight:
-        return []
-    normal, radial = orbit.normal(context), _towards_source(context, orbit)
-    rates = [dot(axis, scene.angular_velocity) for axis in scene.body.principal_axes]
-    inwards = transpose(rotation_matrix(scene.quaternion))
-    along_normal, along_radius = (
-        [dot(axis, apply(inwards, vector)) for axis in scene.body.principal_axes]
-        for vector in (normal, radial)
-    )
-    y = max(range(3), key=lambda i: abs(along_normal[i]))
-    z = max((i for i in range(3) if i != y), key=lambda i: abs(along_radius[i]))
-    x = 3 - y - z
-    n = orbit.mean_motion
-    turning = abs(dot(rates, along_normal) - n) < n / 2
-    if not (turning and abs(along_normal[y]) > 0.8 and abs(along_radius[z]) > 0.6):
-        return []
-    moments = scene.body.principal_moments
-    source = "small librations on a circular orbit"
-    found = []
-    pitch = 3 * (moments[x] - moments[z]) / moments[y]
-    if pitch > 0:
-        found.append(Known("pitch", n * context.sqrt(pitch), _LIBRATION, f"{source}: n sqrt(3 (B - A) / C)"))
-    sx = (moments[y] - moments[z]) / moments[x]
-    sz = (moments[y] - moments[x]) / moments[z]
-    half, product = (1 + 3 * sx + sx * sz) / 2, 4 * sx * sz
-    inner = half**2 - product
-    if product > 0 and half > 0 and inner > 0:
-        squares = (half + context.sqrt(inner), half - context.sqrt(inner))
-        quartic = f"{source}: s^4 + n^2 (1 + 3 sx + sx sz) s^2 + 4 n^4 sx sz = 0 (roll and yaw)"
-        found += [
-            Known(f"rollyaw{k}", n * context.sqrt(square), _LIBRATION, quartic)
-            for k, square in enumerate(squares, 1)
-        ]
-    return found
-
-
-def _towards_source(context: Any, orbit: Any) -> Vector:
-    """Direction of the source on a circular orbit at time zero, space axes."""
-    node, tilt, along = orbit.ascending_node, orbit.inclination, orbit.periapsis + orbit.mean_anomaly
-    c, s = context.cos, context.sin
-    return [
-        c(node) * c(along) - s(node) * s(along) * c(tilt),
-        s(node) * c(along) + c(node) * s(along) * c(tilt),
-        s(along) * s(tilt),
-    ]
-
-
 def _of_spin(scene: Scene) -> list[Known]:
     """Spin and wobble of a body that turns about its axis of largest or smallest moment, without torques."""
     context = scene.context
@@ -180,8 +137,8 @@ def _of_spin(scene: Scene) -> list[Known]:
         a, b, c = moments[across[0]], moments[across[1]], moments[axis]
         if abs(third) <= 3 * context.hypot(rates[across[0]], rates[across[1]]):
             continue
-        symmetric = abs(a - b) <= SYMMETRIC * c
-        change = spin_change(scene, third, rates, axis, [a, b, c])
+        symmetric = abs(a - b) <= _SYMMETRIC * c
+        change = _spin_change(scene, third, rates, axis, [a, b, c])
         source = "initial rate about the principal axis"
         rough, errors = (_SPIN, (0.0, 0.0)) if change is None else (0.0, change)
         where = "body" if symmetric and change is not None else ""
@@ -195,4 +152,178 @@ def _of_spin(scene: Scene) -> list[Known]:
                 source = "free nutation in space: the spin with the wobble"
                 found.append(Known("free_nutation", total, 0.0, source, error + found[0].error, "space"))
         return found
+    return []
+
+
+def _modes_of_core(scene: Scene) -> list[Known]:
+    """Spin, wobble and free core nutation of a body with a core that turns about the core's axis; none for
+    other motions.
+    """
+    core = core_of(scene)
+    turning = None if core is None else _turning(scene, core.axis)
+    if core is None or turning is None:
+        return []
+    spin, moments = turning
+    rates = [dot(axis, scene.angular_velocity) for axis in scene.body.principal_axes]
+    largest = max(range(3), key=lambda i: abs(dot(core.axis, scene.body.principal_axes[i])))
+    change = _spin_change(scene, spin, rates, largest, moments, FluidCore)
+    found = _core_modes(scene, core, spin, moments)
+    if found is None:
+        return []
+    (wobble, fading), (nutation, core_fading) = found
+    source = "linearised equations of mantle and core"
+    pulled = all(
+        x.beside or isinstance(x, GravityGradient | MovingGradient | FluidCore) for x in loads_of(scene)
+    )
+    rough, symmetric = 0.0 if pulled else _TORQUES, abs(moments[0] - moments[1]) <= _SYMMETRIC * moments[2]
+    errors = [float(_SMALL * abs(x) + y) for x, y in ((wobble, fading), (nutation, core_fading))]
+    exact = change is not None and core.friction == 0
+    spinning, error = (0.0, float(change[0] * abs(spin))) if exact and change else (_TORQUES, 0.0)
+    where, turned = "body" if exact else "", "body" if exact and symmetric else ""
+    known = [
+        Known("spin", spin, spinning, "initial rate about the principal axis", error, turned),
+        Known("free_core_nutation", nutation + spin, rough, f"{source}, in space", errors[1]),
+    ]
+    if not _librations(scene):
+        known.append(Known("wobble", wobble, rough, source, errors[0], where))
+        if exact:
+            known.append(
+                Known(
+                    "free_nutation", wobble + spin, rough, f"{source}, in space", errors[0] + error, "space"
+                )
+            )
+    return known
+
+
+def _spin_change(
+    scene: Scene, spin: Any, rates: Vector, axis: int, moments: Vector, known: type | None = None
+) -> tuple[float, float] | None:
+    """Relative errors of the spin about a principal axis as at the start, and of the torque-free wobble.
+
+    None where other torques than gravity gradients (and a `known` type, or beside others) act, or where
+    the amplitude of a body without symmetry counts.
+
+    Args:
+        rates: along all principal axes, rad/s; moments: across the axis, and along it.
+    """
+    context = scene.context
+    low, high, polar = moments
+    tides = context.zero
+    for load in loads_of(scene):
+        source = load.gradient_source
+        if source is not None:
+            distance = source.placement.nearest(context)
+            tides += 3 * source.gravitational_parameter / distance**3 / spin**2
+        elif known is None or not (load.beside or isinstance(load, known)):
+            return None
+    uneven = float(abs(high - low) / polar)
+    tumbling = float(sum(w**2 for k, w in enumerate(rates) if k != axis) / spin**2)
+    if uneven > _SYMMETRIC and tumbling > _SMALL:
+        return None
+    return uneven * (tumbling + float(tides)), _SMALL + float(tides)
+
+
+def _turning(scene: Scene, axis: Vector) -> tuple[Any, Vector] | None:
+    """Rate about an axis (rad/s) and the body's moments across and along it, the least first; None where the
+    rotation isn't about it.
+    """
+    rate = dot(axis, scene.angular_velocity)
+    across = [w - rate * x for w, x in zip(scene.angular_velocity, axis, strict=True)]
+    if abs(rate) * _NEAR <= norm(scene.context, across):
+        return None
+    largest = max(range(3), key=lambda i: abs(dot(axis, scene.body.principal_axes[i])))
+    moments = scene.body.principal_moments
+    low, high = sorted(moments[i] for i in range(3) if i != largest)
+    return rate, [low, high, moments[largest]]
+
+
+def _core_modes(scene: Scene, core: FluidCore, spin: Any, moments: Vector) -> Any:
+    """Frequencies in body axes (rad/s, with the sense of the spin) of the wobble and of the nearly diurnal
+    mode, each with the rate at which friction damps it; None where these aren't circular or elliptic motions.
+    """
+    context, polar, f = scene.context, core.polar, core.flattening
+    core_rate = dot(core.axis, core.at_start(scene))
+    a, b, c = moments[0] - polar * (1 - f), moments[1] - polar * (1 - f), moments[2] - polar
+    push, drag = polar * f * core_rate, core.friction
+    pull = core_rate / (1 - f)
+    own = drag / (polar * (1 - f))
+    back = pull + spin - core_rate
+    matrix = context.matrix(
+        [
+            [-drag / a, (b - c) * spin / a, drag / a, -push / a],
+            [(c - a) * spin / b, -drag / b, push / b, drag / b],
+            [own, -pull, -own, back],
+            [pull, own, -back, -own],
+        ]
+    )
+    values, vectors = context.eig(matrix)
+    found = []
+    for n, value in enumerate(values):
+        # x + i y of a motion exp(i s t) is larger for the s that has its sense
+        x, y = (context.mpc(vectors[i, n]) for i in (2, 3))
+        if context.im(value) != 0 and abs(x + 1j * y) >= abs(x - 1j * y):
+            found.append((context.im(value), abs(context.re(value))))
+    if len(found) != 2:
+        return None
+    found.sort(key=lambda mode: abs(mode[0] / spin + 1))  # the nearly diurnal one is near -1 spin
+    return found[1], found[0]
+
+
+def _librations(scene: Scene, alone: Any = None, node_rate: Any = None) -> list[Known]:
+    """Small oscillations of a body that turns one axis to the source of a gravity gradient; none for others.
+
+    On a circular orbit, with x towards the source and z along the spin, s^2 = -3 n^2 (B - A) / C in
+    longitude, and s^4 + n^2 (1 + 3 sx + sx sz) s^2 + 4 n^4 sx sz = 0 for the figure axis with
+    sx = (C - A) / B and sz = (C - B) / A (Hughes, Spacecraft Attitude Dynamics, 1986, section 9.2). Where it
+    stays in step, the figure axis turns with the wobble in body axes, and by precessing in space (Eckhardt
+    1981, The Moon and the Planets 25, 3; for the Moon 2.9, 75 and 81 years: Rambaux & Williams 2011, Celest.
+    Mech. Dyn. Astr. 109, 85).
+
+    Args:
+        alone: the orbit of the only load. node_rate: of a source that has no orbit, rad/s; None if unknown.
+    """
+    context, body = scene.context, scene.body
+    z = max(range(3), key=lambda i: abs(dot(body.principal_axes[i], scene.angular_velocity)))
+    turning = None if scene.free_flight else _turning(scene, body.principal_axes[z])
+    for load in loads_of(scene) if turning is not None else ():
+        source = load.gradient_source
+        if source is None:
+            continue
+        place = load.source_at_start(scene)
+        distance = norm(context, place)
+        towards = in_body_axes(scene, [x / distance for x in place])
+        facing = {i: abs(dot(body.principal_axes[i], towards)) for i in range(3) if i != z}
+        x = max(facing, key=facing.__getitem__)
+        a, b, c = (body.principal_moments[i] for i in (x, 3 - x - z, z))
+        in_step = source.gravitational_parameter / distance**3 / turning[0] ** 2
+        if a == 0 or facing[x] < _FACING or abs(in_step - 1) > _IN_STEP:
+            continue
+        orbit = load.orbit
+        n = abs(turning[0]) if orbit is None else orbit.mean_motion + orbit.periapsis_rate + orbit.node_rate
+        sx, sz = (c - a) / b, (c - b) / a
+        half, product = (1 + 3 * sx + sx * sz) / 2, 4 * sx * sz
+        both = half**2 - product
+        squares = {"along": 3 * (b - a) / c}
+        if both > 0:
+            root = context.sqrt(both)
+            squares |= {"fast": half + root, "slow": half - root}
+        rates = {name: n * context.sqrt(square) for name, square in squares.items() if square > 0}
+        if alone is not None and alone.circular and alone.fixed_plane:
+            about = "small librations on a circular orbit"
+            quartic = f"{about}: s^4 + n^2 (1 + 3 sx + sx sz) s^2 + 4 n^4 sx sz = 0 (roll and yaw)"
+            words = {"along": f"{about}: n sqrt(3 (B - A) / C)", "fast": quartic, "slow": quartic}
+            names = {"along": "pitch", "fast": "rollyaw1", "slow": "rollyaw2"}
+            return [Known(names[k], rate, _LONGITUDE, words[k]) for k, rate in rates.items()]
+        if not a < b < c:
+            continue
+        about = "small librations in step with the orbit"
+        node = orbit.node_rate if orbit is not None else node_rate or context.zero
+        return [
+            Known("longitude", rates["along"], _LONGITUDE, f"{about}: n sqrt(3 (B - A) / C)"),
+            Known("wobble", rates["slow"], _AXIS, f"{about}, in body axes", frames=(float(n - node),)),
+            Known(
+                "latitude", n - rates["fast"], _AXIS, f"{about}: precession in space",
+                frames=(float(-node), float(n)),
+            ),
+        ]  # fmt: skip
     return []
