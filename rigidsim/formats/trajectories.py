@@ -110,11 +110,8 @@ class Trajectory:
     def unit(self, name: str) -> str | None:
         """The unit of a column as configs write it, as far as the file or the column's name says it."""
         name = self.named(name)
-        unit = self.units.get(name) or name_and_unit(name)[1]
-        if unit is None or unit == "rad s-1":
-            return unit and "rad/s"
-        unit = re.sub(r"(?<=[A-Za-z])(-?\d)", r"^\1", unit)  # of a dataset: kg m2 s-1
-        return unit if is_unit(unit) or holds_times(name) else None
+        unit = config_unit(self.units.get(name) or name_and_unit(name)[1] or "")
+        return unit if is_unit(unit) or (unit and holds_times(name)) else None
 
     def column(self, name: str) -> np.ndarray:
         """Numbers of a column, (rows,) float64.
@@ -183,6 +180,11 @@ class Trajectory:
             change = multiplied if len(names) == 4 else turned
             columns |= dict(zip(names, change(turn, values).T, strict=True))
         return replace(self, columns=columns, axes=axes or "")
+
+
+def config_unit(unit: str) -> str:
+    """A unit of a dataset ("kg m2 s-1") as configs write it ("kg m^2 s^-1")."""
+    return "rad/s" if unit == "rad s-1" else re.sub(r"(?<=[A-Za-z])(-?\d)", r"^\1", unit)
 
 
 def is_trajectory(path: Path) -> bool:

@@ -256,6 +256,35 @@ class MemoryRun(Run):
         return replace(self, outcome=outcome)
 
 
+@dataclass(frozen=True, repr=False)
+class ShownRun(Run):
+    """What isn't a run, shown as one; ``path``: where it is kept. ``notes``: how it was read."""
+
+    path: Path
+    outcome: Brief
+    shown: "xarray.Dataset"
+    notes: tuple[str, ...] = ()
+
+    @property
+    def place(self) -> str:
+        """Where it is kept."""
+        return str(self.path)
+
+    @property
+    def dataset(self) -> "xarray.Dataset":
+        """As of a run."""
+        return self.shown
+
+    @property
+    def files(self) -> list[Path]:
+        """See ``Run``."""
+        return [self.path]
+
+    def concluded(self, outcome: Brief) -> Self:
+        """Nothing is saved of it."""
+        return self
+
+
 def open_run(path: str | Path) -> SavedRun:
     """Open a run folder, or the dataset in one, finished or partial.
 

@@ -18,7 +18,8 @@ from rigidsim.store.sweeps.folder import is_sweep
 from rigidsim.store.sweeps.run import open_sweep
 from rigidsim.workflows.compare.as_run import open_any
 from rigidsim.workflows.fit.folder import FitFolder
-from rigidsim.workflows.read import parse
+from rigidsim.workflows.fit.seen import fitted_run
+from rigidsim.workflows.read import load, parse
 from rigidsim.workflows.run import run
 from rigidsim.workflows.sweeps.members import single_member
 
@@ -41,7 +42,8 @@ def runs_of(paths: Sequence[Path], members: Sequence[int] = ()) -> list[tuple[st
 
 
 def _fit(path: Path) -> Run:
-    return FitFolder(path if path.is_dir() else path.parent).motion()
+    folder = FitFolder(path if path.is_dir() else path.parent)
+    return fitted_run(load(folder.fitted), folder.read_dataset(), str(folder.path))
 
 
 def _members(paths: Sequence[Path], members: Sequence[int]) -> list[tuple[str, Run]]:

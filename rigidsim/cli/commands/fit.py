@@ -9,7 +9,6 @@ from rigidsim.store.outputs import refuse_loss, writing
 from rigidsim.workflows.fit import fitting
 from rigidsim.workflows.fit.folder import FitFolder
 from rigidsim.workflows.fit.result import FitResult
-from rigidsim.workflows.fit.verifying import verify_fit
 from rigidsim.workflows.read import load
 
 
@@ -39,7 +38,7 @@ def resume(path: Path, as_json: bool) -> int:
 
 def verify(path: Path, as_json: bool) -> int:
     """Fit again and compare every number."""
-    verdict = verify_fit(path, told=_tell)
+    verdict = fitting.verify_fit(path, told=_tell)
     answer(as_json, verdict.as_dict(), print_again, verdict)
     return 0 if verdict.identical else 1
 

@@ -15,10 +15,10 @@ from rigidsim.look.figures import available, check_name, figure_format, save_fig
 from rigidsim.look.figures.spectrum import save_spectrum
 from rigidsim.look.figures.sweep_maps import drawable, save_sweep_figure
 from rigidsim.store.outputs import ANALYSIS, refuse_loss, writing
-from rigidsim.store.run import SavedRun, open_run
+from rigidsim.store.run import SavedRun, ShownRun, open_run
 from rigidsim.store.sweeps.folder import is_sweep
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
-from rigidsim.workflows.compare.as_run import TrajectoryRun, open_any
+from rigidsim.workflows.compare.as_run import open_any
 from rigidsim.workflows.view import render, runs_of, show
 
 ALL = "all"
@@ -30,7 +30,7 @@ def analyse(
     """Find lines, save them, print them."""
     opened = open_any(run_path)
     _tell_notes(opened)
-    usual = opened.folder.analysis if isinstance(opened, SavedRun) else opened.beside(ANALYSIS)
+    usual = opened.folder.analysis if isinstance(opened, SavedRun) else _beside(opened, ANALYSIS)
     places = analysing.places_of(out or usual, opened.files, force=force)
     analysis = analysing.analyse(opened, variable or (), lines=lines)
     analysing.save(analysis, places)
@@ -76,8 +76,8 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None, for_slides: s
             own = "" if name == OVERVIEW else "_" + name.replace("[", "_").replace("]", "")
             own += "" if for_slides is None else "_slide"
             usual = f"figure{own}.png"
-            if isinstance(saved, TrajectoryRun):
-                usual = saved.beside(usual).name
+            if isinstance(saved, ShownRun):
+                usual = _beside(saved, usual).name
                 folder = saved.path.parent if out is None else out
             else:
                 folder = saved.folder.path if out is None else out
@@ -127,9 +127,14 @@ def view(
     return 0 if asked else show(named, web=web)
 
 
+def _beside(shown: ShownRun, name: str) -> Path:
+    """Where what is made of another tool's file goes if nothing else is asked for."""
+    return shown.path.with_name(f"{shown.path.stem}_{name}")
+
+
 def _tell_notes(opened: object) -> None:
     """Say how the file of another tool was read."""
-    for text in opened.notes if isinstance(opened, TrajectoryRun) else ():
+    for text in opened.notes if isinstance(opened, ShownRun) else ():
         print(f"note: {text}", file=sys.stderr)
 
 

@@ -6,8 +6,8 @@ import math
 
 from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.scene.readable import span_text
+from rigidsim.workflows.fit.fitting import FitVerdict
 from rigidsim.workflows.fit.result import FitResult, FittedData, digits_text
-from rigidsim.workflows.fit.verifying import FitVerdict
 
 _MOST_OUTLIERS = 10
 _CLOSE = 0.95  # correlations from which on two parameters are named together

@@ -7,10 +7,9 @@ names or matrices say by themselves is taken; the rest is refused, and ``compare
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import xarray
@@ -19,7 +18,7 @@ from rigidsim.errors import RigidsimError
 from rigidsim.formats import ck_reading
 from rigidsim.formats.trajectories import Trajectory, is_trajectory, read_trajectory, trajectory_of
 from rigidsim.scene.scene import Scene
-from rigidsim.store.run import Run, SavedRun, open_run
+from rigidsim.store.run import Run, SavedRun, ShownRun, open_run
 from rigidsim.store.summary import Brief
 from rigidsim.workflows.compare.columns import ANGLES, QUATERNION, Attitudes, attitudes_of
 from rigidsim.workflows.compare.conventions import (
@@ -30,42 +29,6 @@ from rigidsim.workflows.compare.conventions import (
 )
 
 _AXES = {"body_axis": list("xyz"), "space_axis": list("XYZ"), "quaternion_component": list("wxyz")}
-
-
-@dataclass(frozen=True, repr=False)
-class TrajectoryRun(Run):
-    """A trajectory of another tool, shown as a run is."""
-
-    path: Path
-    outcome: Brief
-
-    @property
-    def place(self) -> str:
-        """The file."""
-        return str(self.path)
-
-    @property
-    def files(self) -> list[Path]:
-        """See ``Run``."""
-        return [self.path]
-
-    @cached_property
-    def dataset(self) -> xarray.Dataset:
-        """Attitude, rates and flight, in s, rad/s and SI, and all other columns as they are."""
-        return run_dataset(self.path)
-
-    @property
-    def notes(self) -> list[str]:
-        """What a user should know of how it was read."""
-        return str(self.dataset.attrs["comment"]).split("; ")
-
-    def concluded(self, outcome: Brief) -> Self:
-        """Nothing is saved of it."""
-        return self
-
-    def beside(self, name: str) -> Path:
-        """Where something that is made of it goes if nothing else is asked for."""
-        return self.path.with_name(f"{self.path.stem}_{name}")
 
 
 def trajectory_given(table: Any, scene: Scene, kernels: Sequence[str | Path]) -> Trajectory:
@@ -96,26 +59,17 @@ def files_of(table: Any, kernels: Sequence[str | Path] = ()) -> list[Path]:
     return [Path(path) for path in (*read, *kernels)]
 
 
-def open_any(path: str | Path) -> SavedRun | TrajectoryRun:
+def open_any(path: str | Path) -> SavedRun | ShownRun:
     """A run's folder or dataset, or another tool's file.
 
     Raises:
-        RunFolderError: neither, or a damaged run. RigidsimError: the file can't be read.
-    """
-    given = Path(path)
-    if not is_trajectory(given) or not given.exists():
-        return open_run(given)
-    outcome = Brief(name=given.stem, status="finished", message=f"is the file {given.name}")
-    return TrajectoryRun(given, outcome)
-
-
-def run_dataset(path: Path) -> xarray.Dataset:
-    """The dataset of a trajectory's file.
-
-    Raises:
+        RunFolderError: neither, or a damaged run.
         RigidsimError: the file can't be used, or its convention can't be found.
     """
-    trajectory = read_trajectory(path)
+    given_path = Path(path)
+    if not is_trajectory(given_path) or not given_path.exists():
+        return open_run(given_path)
+    trajectory = read_trajectory(given_path)
     epoch = trajectory.epochs[0] if trajectory.epochs else None
     given = attitudes_of(trajectory, epoch)
     told = list(given.told)
@@ -138,11 +92,12 @@ def run_dataset(path: Path) -> xarray.Dataset:
         told.append(f"taken as {found}: it turns at these")
         if found.undecided:
             others = len(found.undecided)
-            told.append(
-                f"{others} other conventions would fit as well; compare with an experiment can decide"
-            )
+            told.append(f"{others} other conventions fit as well; compare decides with an experiment")
     dated = {"epoch": str(epoch)} if epoch is not None else {}
-    return dataset_of_rows(given, found, {"title": path.stem, "comment": "; ".join(told), **dated})
+    name = given_path.stem
+    dataset = dataset_of_rows(given, found, {"title": name, "comment": "; ".join(told), **dated})
+    outcome = Brief(name=name, status="finished", message=f"is the file {given_path.name}")
+    return ShownRun(given_path, outcome, dataset, tuple(told))
 
 
 def dataset_of_rows(given: Attitudes, found: Convention, attributes: Mapping[str, Any]) -> xarray.Dataset:

@@ -182,7 +182,7 @@ def find_convention(
             for start in plain
             for one in start.turned_to(start.quaternions(here)[0], own[0])
             if _has(one, asked, "offset")
-        ]
+        ] or tried
     nearest = min(score for score, _ in tried)
     near, turns = _near(tried, _ALIKE), False
     if given.rates is not None:

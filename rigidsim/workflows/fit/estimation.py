@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -29,8 +29,6 @@ _LAST = 0.1  # sigmas: a step as short as this most likely ends a fit, where der
 _NEAR = 0.02  # sigmas: derivatives from no further away are those of a place, to far less than sigmas show
 _LATELY = 10  # evaluations
 _ROUNDED = 1e-11  # relative change of a sum of squares that rounding makes
-_BLOCK = 250  # rows
-_TALL = 4  # times: of the rows of a block by its columns, and of a matrix by a block's rows
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ class Linear:
         known = self.weights > 0
         prior = np.concatenate([np.diag(self.weights), (self.weights * self.pull)[:, None]], axis=1)[known]
         data = np.concatenate([self.slopes, self.residuals[:, None]], axis=1)
-        return np.asarray(np.linalg.qr(np.concatenate([_upper(data), prior]), mode="r"))
+        return np.asarray(np.linalg.qr(np.concatenate([data, prior]), mode="r"))
 
     @cached_property
     def cost(self) -> float:
@@ -67,17 +65,6 @@ class Linear:
         """By how much a step would lower the cost if the fit were linear."""
         change = self.triangle[:, :-1] @ step
         return float(change @ (2 * self.triangle[:, -1] - change))
-
-
-def _upper(matrix: np.ndarray) -> np.ndarray:
-    """R of a tall matrix, by blocks of rows that stay in the processor's cache: a tenth of the time."""
-    columns = matrix.shape[1]
-    block = max(_BLOCK, _TALL * columns)
-    while len(matrix) > _TALL * block:
-        whole = len(matrix) // block * block
-        upper: Any = np.linalg.qr(matrix[:whole].reshape(-1, block, columns), mode="r")
-        matrix = np.concatenate([upper.reshape(-1, columns), matrix[whole:]])
-    return np.asarray(np.linalg.qr(matrix, mode="r"))
 
 
 class Solution:

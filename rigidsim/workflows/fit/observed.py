@@ -10,6 +10,7 @@ from itertools import product
 from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.formats.trajectories import config_unit
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.names import written
 from rigidsim.model.observables.observable import Observable
@@ -56,6 +57,11 @@ class Observed:
         """Name of what is recorded for it; any attitude as a quaternion."""
         return "quaternion" if self.rotation else self.name
 
+    @property
+    def config_unit(self) -> str | None:
+        """``unit`` as configs write it."""
+        return None if self.unit is None else config_unit(self.unit)
+
 
 @contextmanager
 def observing(experiment: Experiment) -> Iterator[tuple[list[Observed], Experiment]]:
@@ -67,41 +73,34 @@ def observing(experiment: Experiment) -> Iterator[tuple[list[Observed], Experime
     """
     table = experiment.config.fit
     assert table is not None
-    entered: list[str] = []
+    texts = [data.observable for data in table.data]
+    own = [state.name for state in experiment.config.states]
+    names, also, entered = [], list[str](), list[str]()
     try:
-        texts = [data.observable for data in table.data]
-        own = [state.name for state in experiment.config.states]
-        names, also = [], list[str]()
         for number, text in enumerate(texts, start=1):
-            if text in OBSERVABLES or text in own:
-                names.append("quaternion" if text in _ROTATIONS else text)
-                continue
-            name = f"{_PREFIX}{texts.index(text)}"
-            if name not in entered:
-                observable, states = _expression(name, text, experiment.config, number)
-                OBSERVABLES[name] = observable
+            name = QUATERNION if text in _ROTATIONS else text
+            if text not in OBSERVABLES and text not in own:
+                name = f"{_PREFIX}{texts.index(text)}"
+                OBSERVABLES[name], states = _expression(name, text, experiment.config, number)
                 entered.append(name)
                 also += [state for state in states if state in own]
             names.append(name)
-        record = [*dict.fromkeys([*names, *also])]
-        quiet = experiment.quiet(record, events=[], fit=None)
+        quiet = experiment.quiet([*dict.fromkeys([*names, *also])], events=[], fit=None)
         recorded = {one.name: one for one in prepare(quiet).system.recorded}
         found = []
         for text, name in zip(texts, names, strict=True):
-            one = recorded[name]
+            one, expression = recorded[name], name in entered
             labels = [LABELS.get(dim, [str(i) for i in range(one.count)]) for dim in one.dims]
-            suffixes = ["_" + "_".join(parts) if parts else "" for parts in product(*labels)]
+            form, unit = "plain" if expression else "angle" if one.units == "rad" else "plain", one.units
+            if text in _ROTATIONS:
+                form = text
             if text == EULER_ANGLES:
-                components = tuple(f"{text}_{angle}" for angle in LABELS["euler_angle"])
-                found.append(Observed(text, text, text, components, "rad"))
-                continue
-            form = QUATERNION if text == QUATERNION else "angle" if one.units == "rad" else "plain"
-            expression = name.startswith(_PREFIX)
-            shown = name if not expression else "value"
-            components = tuple(f"{shown}{suffix}" for suffix in suffixes)
-            if expression:
-                form = "plain"
-            found.append(Observed(text, name, form, components, None if expression else one.units))
+                labels, unit = [LABELS["euler_angle"]], "rad"
+            shown = "value" if expression else text
+            components = tuple("_".join([shown, *parts]) for parts in product(*labels))
+            found.append(
+                Observed(text, text if form == text else name, form, components, None if expression else unit)
+            )
         yield found, quiet
     finally:
         for name in entered:

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
-from typing import Any, Protocol
 
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.scene.choices import DEFAULT_METHOD
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.row_rotations import conjugated, multiplied, normalised, vector_of
-from rigidsim.scene.sample_times import Time
-from rigidsim.scene.schema import Config
 from rigidsim.solve.by_keys import turned
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.tangents import LostTangents
@@ -54,22 +50,6 @@ class Prediction:
     noise: dict[str, np.ndarray] = field(default_factory=dict)
 
 
-class Predictor(Protocol):
-    """Something that predicts; ``how`` says in words where its derivatives come from."""
-
-    how: str
-
-    def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Prediction:
-        """Predictions, with derivatives if these are asked for, at ascending times (s).
-
-        Raises:
-            NotPredicted: the motion doesn't get there.
-        """
-
-    def along(self, values: Sequence[float], times: np.ndarray) -> Prediction:
-        """The same of attitude, angular velocity and position, as far as the scene has them."""
-
-
 class ByDifferences:
     """Runs of the experiment, and central differences between them."""
 
@@ -82,7 +62,11 @@ class ByDifferences:
         self._adapted = False
 
     def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Prediction:
-        """See ``Predictor.at``."""
+        """Predictions, with derivatives if these are asked for, at ascending times (s).
+
+        Raises:
+            NotPredicted: the motion doesn't get there.
+        """
         centre = self.values(values, times)
         if not slopes:
             return Prediction(centre)
@@ -93,14 +77,12 @@ class ByDifferences:
         return found
 
     def along(self, values: Sequence[float], times: np.ndarray) -> Prediction:
-        """See ``Predictor.along``."""
+        """The same of attitude, angular velocity and position, as far as the scene has them."""
         names = []
         for name in ALONG:
-            try:
+            with suppress(ConfigError):
                 prepare(self._quiet.quiet([name]))
-            except ConfigError:
-                continue
-            names.append(name)
+                names.append(name)
         if not names:
             return Prediction({})
         forms = {"quaternion": "quaternion"}
@@ -109,14 +91,12 @@ class ByDifferences:
 
     def values(self, values: Sequence[float] | np.ndarray, times: np.ndarray) -> dict[str, np.ndarray]:
         """Predictions alone."""
-        listed = [ExactNumber(Fraction(time)) for time in times.tolist()]
         try:
             changed = self._keys.experiment(values, self._quiet)
-            table = changed.config.time.model_copy(
-                update={"times": listed, "end": None, "samples": None, "every": None}
-            )
-            changed = replace(changed, config=_quiet_like(changed, self._quiet, table))
-            made = run(changed, out=None, progress=False)
+            made = run(
+                changed.quiet(self._quiet.config.output.record, times.tolist(), events=[], fit=None),
+                out=None, progress=False,
+            )  # fmt: skip
         except ConfigError as error:
             raise NotPredicted(f"the experiment can't be run at these values: {error}") from None
         dataset = made.dataset
@@ -188,17 +168,11 @@ class ByTangents:
         )
 
     def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Prediction:
-        """See ``Predictor.at``."""
-        every = self._every(values, times, slopes)
-        names = dict.fromkeys([*self._names, *(name for name in ALONG if name in every)])
-        return self._predicted({name: every[name] for name in names})
+        """Predictions, with derivatives if these are asked for, at ascending times (s).
 
-    def along(self, values: Sequence[float], times: np.ndarray) -> Prediction:
-        """See ``Predictor.along``."""
-        return self.at(values, times)
-
-    def _every(self, values: Sequence[float], times: np.ndarray, slopes: bool) -> dict[str, tuple[Any, Any]]:
-        """Values and derivatives, (n, keys, components), of all that there is; without derivatives, None."""
+        Raises:
+            NotPredicted: the motion doesn't get there.
+        """
         given = {key: float(value) for key, value in zip(self._keys, values, strict=True)}
         try:
             rows = self._source.rows(given, times, slopes=slopes)
@@ -206,24 +180,25 @@ class ByTangents:
             raise NotPredicted(f"{error}") from None
         except ConfigError as error:
             raise NotPredicted("; ".join(problem.what for problem in error.problems)) from None
-        found = {
-            name: (x.astype(float), rows.slopes[name].astype(float) if slopes else None)
-            for name, x in rows.values.items()
-        }
-        turning = turned(rows.values[QUATERNION], rows.slopes[QUATERNION]).astype(float) if slopes else None
-        return {**found, QUATERNION: (normalised(found[QUATERNION][0]), turning)}
-
-    def _predicted(self, every: Mapping[str, tuple[Any, Any]]) -> Prediction:
         made = Prediction({})
-        for name, (value, slopes) in every.items():
-            if not (np.isfinite(value).all() and (slopes is None or np.isfinite(slopes).all())):
-                raise NotPredicted(f"{name} has no finite value at each observation")
-            made.values[name] = value
-            if slopes is not None:
-                made.slopes[name] = np.ascontiguousarray(slopes.transpose(0, 2, 1))
+        for name in dict.fromkeys([*self._names, *(name for name in ALONG if name in rows.values)]):
+            value = rows.values[name].astype(float)
+            made.values[name] = normalised(value) if name == QUATERNION else value
+            found = [value]
+            if slopes:  # (n, keys, components)
+                exact = rows.slopes[name]
+                exact = turned(rows.values[name], exact) if name == QUATERNION else exact
+                made.slopes[name] = np.ascontiguousarray(exact.astype(float).transpose(0, 2, 1))
                 size = 1.0 if name == QUATERNION else float(np.abs(value).max()) or 1.0
                 made.noise[name] = _ROUNDING * size / self._sizes
+                found.append(made.slopes[name])
+            if not all(np.isfinite(x).all() for x in found):
+                raise NotPredicted(f"{name} has no finite value at each observation")
         return made
+
+    def along(self, values: Sequence[float], times: np.ndarray) -> Prediction:
+        """The same, with attitude, angular velocity and position, as far as the scene has them."""
+        return self.at(values, times)
 
 
 def difference(quantity: Observed, one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -234,7 +209,4 @@ def difference(quantity: Observed, one: np.ndarray, other: np.ndarray) -> np.nda
     return np.asarray(np.remainder(apart + np.pi, 2 * np.pi) - np.pi) if quantity.form == "angle" else apart
 
 
-def _quiet_like(changed: Experiment, quiet: Experiment, time: Time) -> Config:
-    """The config of changed values with what is recorded of another."""
-    kept = {name: getattr(quiet.config, name) for name in ("output", "events", "fit")}
-    return changed.config.model_copy(update={**kept, "time": time})
+Predictor = ByDifferences | ByTangents

@@ -1,19 +1,159 @@
-"""From several starts to the best fit, with outliers left out."""
+"""From several starts to the best fit: residuals in units of their sigmas, with outliers left out."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from rigidsim.errors import RigidsimError
-from rigidsim.workflows.fit.estimation import Ended, iterate
-from rigidsim.workflows.fit.weighing import Residuals, Weighing
+from rigidsim.workflows.fit.estimation import Ended, Linear, iterate
+from rigidsim.workflows.fit.keys import FitKeys
+from rigidsim.workflows.fit.observed import QUATERNION
+from rigidsim.workflows.fit.predictions import ALONG, NotPredicted, Prediction, Predictor, difference
+from rigidsim.workflows.fit.readings import Readings
 
+_FURTHER = 1.5  # times the span of the data, up to which predictions along the run come with them
+_SMALL = 1e-4  # rad, below which the series of a function of an angle is right to rounding
 _ROUNDS = 25
 _FROM_START = 40  # iterations from each of several starts
+_ROUNDED = 1e-9  # relative difference of sums of squares that rounding makes
 _SAME = 1e-6  # relative difference of the sums of squares of starts that end in the same place
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Readings beside a prediction, one array for each set.
+
+    Attributes:
+        residuals: (rows, components), observed less computed, SI; rotation vectors for attitudes.
+        slopes: (rows, components, numbers), of what is computed. noise: (numbers,), of these.
+    """
+
+    residuals: list[np.ndarray]
+    slopes: list[np.ndarray]
+    noise: list[np.ndarray]
+
+
+class Weighing:
+    """Readings of all sets, and what an experiment predicts for them."""
+
+    def __init__(
+        self, keys: FitKeys, readings: Sequence[Readings], predictor: Predictor, along: np.ndarray
+    ) -> None:
+        self.keys, self.readings, self._predictor = keys, list(readings), predictor
+        begin, last = float(keys.scene.start), max(float(r.times[-1]) for r in readings)
+        near = along[-1] - begin <= _FURTHER * (last - begin)  # a longer way isn't gone in each evaluation
+        parts = [*(r.times for r in readings), along if near else along[:0]]
+        self.times, places = np.unique(np.concatenate(parts), return_inverse=True)
+        *self._places, self._along = np.split(places, np.cumsum([len(part) for part in parts])[:-1])
+        self._along_times = along
+        self.used = [np.ones(len(r.times), dtype=bool) for r in readings]
+        self._count = len(keys.estimated)
+        self._start = np.array([one.start for one in keys.estimated])
+        self._fixed = np.array([one.start for one in keys.considered])
+        self._weights = np.array([0.0 if k.sigma is None else 1.0 / k.sigma for k in keys.estimated])
+        self.failure = ""
+        self._sloped: Prediction | None = None  # the latest prediction, with the latest derivatives
+        self._latest: tuple[bytes, Residuals] | None = None  # the same beside the readings, with its values
+        self._fresh = False  # whether these derivatives are those of its values
+
+    def compared(self, values: np.ndarray, *, fresh: bool = True) -> Residuals:
+        """Residuals and slopes of all rows, used or not; the latest slopes unless they are to be ``fresh``.
+
+        Raises:
+            NotPredicted: the motion doesn't reach them.
+        """
+        if self._latest is not None and self._latest[0] == values.tobytes() and self._fresh >= fresh:
+            return self._latest[1]
+        found = self._predictor.at([*values, *self._fixed], self.times, slopes=fresh)
+        self._fresh = bool(found.slopes)  # some come with them, asked for or not
+        if not found.slopes:
+            assert self._sloped is not None
+            found = Prediction(found.values, self._sloped.slopes, self._sloped.noise)
+        self._sloped = found
+        self._latest = values.tobytes(), self._beside(found)
+        return self._latest[1]
+
+    def along(self, values: np.ndarray) -> Prediction:
+        """Predictions with derivatives along the run, as far as the scene has them: of the latest evaluation,
+        which is that of the values where a fit ends.
+        """
+        found = self._sloped
+        if (
+            found is None
+            or not len(self._along)
+            or QUATERNION not in found.values
+            or "angular_velocity" not in found.values
+        ):
+            try:
+                return self._predictor.along([*values, *self._fixed], self._along_times)
+            except NotPredicted:
+                return Prediction({})
+        names = [name for name in ALONG if name in found.values]
+        return Prediction(
+            {name: found.values[name][self._along] for name in names},
+            {name: found.slopes[name][self._along] for name in names},
+        )
+
+    def _beside(self, found: Prediction) -> Residuals:
+        parts = [self._set(r, p, found) for r, p in zip(self.readings, self._places, strict=True)]
+        return Residuals(*map(list, zip(*parts, strict=True)))
+
+    def _set(
+        self, readings: Readings, places: np.ndarray, found: Prediction
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        name = readings.quantity.variable
+        computed, slopes = found.values[name][places], found.slopes[name][places]
+        residuals = difference(readings.quantity, computed, readings.values)
+        if readings.quantity.rotation:
+            slopes = np.einsum("nij,njk->nik", inverse_right_jacobian(residuals), slopes)
+        return residuals, slopes, found.noise[name]
+
+    def linearised(self, values: np.ndarray, fresh: bool = True) -> Linear | None:
+        """The fit at some values, by the rows that are used, with the latest slopes unless they are to be
+        ``fresh``; None where the motion can't be computed.
+        """
+        try:
+            compared = self.compared(values, fresh=fresh)
+        except NotPredicted as error:
+            self.failure = str(error)
+            return None
+        residuals, slopes, noise = [], [], np.zeros(len(self.keys.all))
+        for n, readings in enumerate(self.readings):
+            used, sigmas = self.used[n], readings.sigmas[self.used[n]]
+            residuals.append((compared.residuals[n][used] / sigmas).ravel())
+            slope = compared.slopes[n][used] / sigmas[:, :, None]
+            slopes.append(slope.reshape(-1, slope.shape[2]))
+            noise += compared.noise[n] ** 2 * np.sum(sigmas**-2.0)
+        every = np.concatenate(slopes)
+        k = self._count
+        return Linear(
+            np.concatenate(residuals), every[:, :k], every[:, k:], np.sqrt(noise)[:k],
+            self._start - values, self._weights,
+        )  # fmt: skip
+
+    def sizes(self, compared: Residuals) -> list[np.ndarray]:
+        """Of each row the largest residual of its components, in sigmas, (rows,) for each set."""
+        return [
+            np.abs(residuals / readings.sigmas).max(axis=1)
+            for residuals, readings in zip(compared.residuals, self.readings, strict=True)
+        ]
+
+
+def inverse_right_jacobian(vectors: np.ndarray) -> np.ndarray:
+    """How rotation vectors (rows, 3) from computed to observed attitudes shrink as the computed ones turn,
+    (rows, 3, 3): 1 + [v]/2 + (1/a^2 - (1 + cos a)/(2 a sin a)) [v]^2, a = |v| (Chirikjian 2012, eq. 10.86).
+    """
+    angle = np.linalg.norm(vectors, axis=1)
+    safe = np.where(angle > _SMALL, angle, 1.0)
+    factor = 1 / safe**2 - 0.5 / (safe * np.tan(0.5 * safe))  # (1 + cos a)/sin a = cot(a/2)
+    factor = np.where(angle > _SMALL, factor, 1.0 / 12.0)
+    x, y, z = vectors.T
+    zero = np.zeros_like(x)
+    cross = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+    return np.asarray(np.eye(3) + 0.5 * cross + factor[:, None, None] * (cross @ cross))
 
 
 @dataclass
@@ -75,7 +215,7 @@ def _from_starts(
         most = {} if starts == 1 else {"most": _FROM_START}
         ended = iterate(values, weighing.linearised, _telling(told), **most)
         costs.append(np.nan if ended is None else ended.linear.cost)
-        if ended is not None and (best is None or _better(ended, best)):
+        if ended is not None and (best is None or ended.linear.cost < best.linear.cost * (1 - _ROUNDED)):
             best = ended
     if best is None:
         raise RigidsimError(f"fit: {weighing.failure}; change the values that it starts from")
@@ -84,11 +224,6 @@ def _from_starts(
         same = sum(cost <= best.linear.cost * (1 + _SAME) + _SAME for cost in costs)
         notes.append(f"{same} of {starts} starts end in the best fit")
     return best, costs, notes
-
-
-def _better(one: Ended, other: Ended) -> bool:
-    """Whether an end is lower, by more than rounding."""
-    return one.linear.cost < other.linear.cost * (1 - 1e-9)
 
 
 def drawn(weighing: Weighing, starts: int) -> list[np.ndarray]:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rigidsim.errors import RunFolderError
 from rigidsim.scene.row_rotations import conjugated, multiplied, normalised, vector_of
-from rigidsim.store.run import Run
-from rigidsim.store.summary import Brief
+from rigidsim.store.run import ShownRun
 from rigidsim.workflows.fit.observed import QUATERNION
 from rigidsim.workflows.run import run
 
@@ -25,35 +23,7 @@ _ROUNDING = 1e-6  # rad: between two ways of integrating a motion that isn't cha
 _SHARE = 0.1  # of a sigma, by which these may differ where the motion amplifies both
 
 
-@dataclass(frozen=True, repr=False)
-class FittedRun(Run):
-    """The motion of a fitted experiment in memory; ``source``: where the fit is kept."""
-
-    outcome: Brief
-    shown: xarray.Dataset
-    source: str
-
-    @property
-    def place(self) -> str:
-        """The fit's folder."""
-        return self.source
-
-    @property
-    def files(self) -> list[Path]:
-        """See ``Run``."""
-        return [Path(self.source)]
-
-    @property
-    def dataset(self) -> xarray.Dataset:
-        """As of a run, with ``attitude_covariance`` beside it, at the times at which this is known."""
-        return self.shown
-
-    def concluded(self, outcome: Brief) -> Self:
-        """Nothing is saved of it."""
-        return self
-
-
-def fitted_run(experiment: Experiment, fit: xarray.Dataset, source: str = "memory") -> FittedRun:
+def fitted_run(experiment: Experiment, fit: xarray.Dataset, source: str = "memory") -> ShownRun:
     """Run a fitted experiment at the times of its fit's dataset, and put the predicted covariance beside it.
 
     Args:
@@ -62,11 +32,9 @@ def fitted_run(experiment: Experiment, fit: xarray.Dataset, source: str = "memor
     Raises:
         RunFolderError: the experiment's motion isn't that of the dataset.
     """
-    record = experiment.config.output.record
-    if record is not None and QUATERNION not in record and _COVARIANCE in fit:
-        record = [*record, QUATERNION]
-    else:
-        record = None
+    asked = experiment.config.output.record
+    more = asked is not None and QUATERNION not in asked and _COVARIANCE in fit
+    record = [*asked, QUATERNION] if more and asked else None
     # without its own error, which would mislead beside the fit's
     made = run(experiment.quiet(record, fit["time"].values.tolist()), out=None, progress=False)
     found = made.dataset
@@ -77,7 +45,8 @@ def fitted_run(experiment: Experiment, fit: xarray.Dataset, source: str = "memor
         covariance.attrs["covariance_of"] = "attitude"
         _refuse_other(found, fit, source)
         found = found.assign({_COVARIANCE: covariance})
-    return FittedRun(made.outcome, found.assign_attrs(fit=str(fit.attrs.get("sentence", ""))), source)
+    shown = found.assign_attrs(fit=str(fit.attrs.get("sentence", "")))
+    return ShownRun(Path(source), made.outcome, shown)
 
 
 def _refuse_other(found: xarray.Dataset, fit: xarray.Dataset, source: str) -> None:
