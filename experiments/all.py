@@ -15,10 +15,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from experiments.common import DEFAULT_OUT, Check, table
+from experiments.common import Check, add_arguments, table
 
 STUDIES = (
     "earth_free_nutation",
+    "toutatis",
     "heavy_top_regimes",
     "flip_period",
     "precession_and_nutation",
@@ -69,8 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run them, print the table, return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m experiments.all")
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"default: {', '.join(STUDIES)}")
-    parser.add_argument("--out", type=Path, default=DEFAULT_OUT, help="folder of the figures")
-    parser.add_argument("--full", action="store_true", help="longer runs and more cases")
+    add_arguments(parser)
     arguments = parser.parse_args(argv)
     checks, broken = run_studies(arguments.names or STUDIES, arguments.full, arguments.out)
     print(table(checks, "All studies"))

@@ -184,21 +184,6 @@ def sound(axes: list[Axis]) -> bool:
     return bool((ratios <= TIMES).mean() >= PART and (silent <= MOST).all() and np.isfinite(ratios).all())
 
 
-def picture(turning: list[Axis], resting: list[Axis]) -> Picture:
-    """Announced errors against true ones."""
-    ran = [*turning, *resting]
-    ends = np.array([min(one.true for one in ran) / 3, max(one.announced for one in ran) * 3])
-    curves = [Curve(ends, factor * ends, label, "grey", style, 1) for factor, label, style in (
-        (1, "announced = true", "-"), (10, "ten times the true one", "--"))]  # fmt: skip
-    for some, color, label in ((turning, "blue", "rotating bodies"), (resting, "orange", "librating bodies")):
-        points = np.array([(one.true, one.announced) for one in some])
-        curves.append(Curve(*points.T, label, color, "o", 1.5))
-    panel = Panel("Axes of momentum and figure", "true error, from the full motion (rad)", "announced (rad)",
-                  curves, "xy")  # fmt: skip
-    title = "Averages of random bodies announce errors that cover the true ones"
-    return Picture(title, "a", [panel], (8.4, 6.2))
-
-
 @Study
 def study(full: bool, seed: int = 16) -> Answer:
     """Rotating and librating bodies."""
@@ -214,3 +199,22 @@ def study(full: bool, seed: int = 16) -> Answer:
         Check("librating bodies: errors beyond what is allowed", float(not sound(resting)), 0.0, 0.0, "1",
               "3 times the announced one in 99 %, 10 times in all without a warning", "absolute"),
     ], picture(rotating_ones, resting)  # fmt: skip
+
+
+def picture(turning: list[Axis], resting: list[Axis]) -> Picture:
+    """Announced errors against true ones."""
+    ran = [*turning, *resting]
+    ends = np.array([min(one.true for one in ran) / 3, max(one.announced for one in ran) * 3])
+    curves = [Curve(ends, factor * ends, label, "grey", style, 1) for factor, label, style in (
+        (1, "announced = true", "-"), (10, "ten times the true one", "--"))]  # fmt: skip
+    for some, color, label in ((turning, "blue", "rotating bodies"), (resting, "orange", "librating bodies")):
+        points = np.array([(one.true, one.announced) for one in some])
+        curves.append(Curve(*points.T, label, color, "o", 1.5))
+    panel = Panel("Axes of momentum and figure", "true error, from the full motion (rad)", "announced (rad)",
+                  curves, "xy")  # fmt: skip
+    title = "Averages of random bodies announce errors that cover the true ones"
+    return Picture(title, "a", [panel], (8.4, 6.2))
+
+
+if __name__ == "__main__":
+    raise SystemExit(study.main())

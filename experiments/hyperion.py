@@ -213,60 +213,6 @@ def e_fold(motion: Motion, state: Resonance) -> float:
     return float(50 / np.polyfit(np.arange(len(largest)), np.log(largest), 1)[0])
 
 
-def picture(motion: Motion, shown: dict[str, Resonance], exponents: dict[str, Exponent]) -> Picture:
-    """Surface of section, loss of attitude, wandering axis, convergence."""
-
-    def section(theta: float, spin: float, turns: int, color: str, size: float) -> Curve:
-        path = motion.samples(motion.state(theta, spin), turns, turns)
-        angle = np.degrees(2 * np.arctan2(path[:, 6], path[:, 3])) % 180
-        return Curve(angle, path[:, 2] * motion.rate, "", color, ".", size, {"zorder": 1})
-
-    def named(axes: Any) -> None:
-        for name, one in shown.items():
-            color, place = "green" if STATES[name][2] else "red", (np.degrees(one.theta), one.spin)
-            axes.plot(*place, "o", color=color, markersize=7, clip_on=False, markerfacecolor="none", mew=1.8)
-            axes.annotate(name, place, (7, 4), textcoords="offset points", color=color, fontweight="bold")
-
-    def pointing(axes: Any) -> None:
-        longitude, latitude = (
-            np.degrees(np.arctan2(spin[:, 1], spin[:, 0])),
-            np.degrees(np.arcsin(spin[:, 2])),
-        )
-        points = axes.scatter(longitude, latitude, c=time, s=2.5, cmap="viridis")
-        axes.figure.colorbar(points, ax=axes, label="time (revolutions)")
-
-    sections = [section(np.pi / 2, 1.0, 3000, "grey", 0.22)]
-    sections += [
-        section(t, w, 250, "blue", 0.28) for t in (0.0, np.pi / 2) for w in np.arange(0.05, 3.0, 0.1)
-    ]
-    result = simulate(CONFIG.format(tilt=TILT, end=80 * np.pi, samples=4001))
-    axes = matrices(result.values("quaternion"))
-    short, w = axes[:, :, 2], np.einsum("nij,nj->ni", axes, result.values("angular_velocity"))
-    time, spin = result.values("time") / (2 * np.pi), w / np.linalg.norm(w, axis=1)[:, None]
-    axes_of = ((short, "shortest axis", "blue"), (spin, "axis of rotation", "orange"))
-    away = [
-        Curve(time, np.degrees(np.arctan2(np.hypot(*one[:, :2].T), one[:, 2])), label, color, width=1)
-        for one, label, color in axes_of
-    ]
-    rates = []
-    for (name, one), color in zip(exponents.items(), ("blue", "orange"), strict=True):
-        label = f"{name}: {one.rate:.3f} ± {one.error:.3f} n"
-        rates += [Curve(np.arange(1, len(one.running) + 1), one.running, label, color),
-                  Curve(None, RATES[name], "", color, "--", 0.9)]  # fmt: skip
-    title = "Hyperion tumbles: no attitude in the chaotic zone or at the synchronous state lasts"
-    return Picture(title, "ab;cd", [
-        Panel("In the plane: section at pericentre (grey: the chaotic zone)",
-              "long axis from pericentre, mod 180 (deg)", "w at pericentre (n)", sections, more=named,
-              limits={"xlim": (0, 180), "ylim": (0, 3)}),
-        Panel("A tilt of 0.01 rad doesn't stay one", "time (revolutions)",
-              "angle from the orbit's normal (deg)", away, "y", legend="lower right"),
-        Panel("Where the axis of rotation points, in space", "longitude (deg)", "latitude (deg)",
-              more=pointing, limits={"xlim": (-180, 180), "ylim": (-90, 90)}),
-        Panel("Convergence (dashed: expected)", "revolutions", "largest Lyapunov rate so far (n)", rates, "x",
-              limits={"ylim": (0, 0.25)}, legend="upper right"),
-    ], (12, 9.5))  # fmt: skip
-
-
 @Study
 def study(full: bool) -> Answer:
     """Stability, Lyapunov rates, pictures; see the module's text."""
@@ -321,4 +267,63 @@ def study(full: bool) -> Answer:
             Check(f"Lyapunov rate, {name}, {len(lean)} x {revolutions} revolutions", rate, RATES[name],
                   tolerance, "n", "re-computed (the paper: about 0.1); 15 %, shorter runs 30 %")
         )  # fmt: skip
-    return checks, picture(motion, shown, exponents)
+    figure = picture(motion, shown, exponents)
+    return checks, figure
+
+
+def picture(motion: Motion, shown: dict[str, Resonance], exponents: dict[str, Exponent]) -> Picture:
+    """Surface of section, loss of attitude, wandering axis, convergence."""
+
+    def section(theta: float, spin: float, turns: int, color: str, size: float) -> Curve:
+        path = motion.samples(motion.state(theta, spin), turns, turns)
+        angle = np.degrees(2 * np.arctan2(path[:, 6], path[:, 3])) % 180
+        return Curve(angle, path[:, 2] * motion.rate, "", color, ".", size, {"zorder": 1})
+
+    def named(axes: Any) -> None:
+        for name, one in shown.items():
+            color, place = "green" if STATES[name][2] else "red", (np.degrees(one.theta), one.spin)
+            axes.plot(*place, "o", color=color, markersize=7, clip_on=False, markerfacecolor="none", mew=1.8)
+            axes.annotate(name, place, (7, 4), textcoords="offset points", color=color, fontweight="bold")
+
+    def pointing(axes: Any) -> None:
+        longitude, latitude = (
+            np.degrees(np.arctan2(spin[:, 1], spin[:, 0])),
+            np.degrees(np.arcsin(spin[:, 2])),
+        )
+        points = axes.scatter(longitude, latitude, c=time, s=2.5, cmap="viridis")
+        axes.figure.colorbar(points, ax=axes, label="time (revolutions)")
+
+    sections = [section(np.pi / 2, 1.0, 3000, "grey", 0.22)]
+    sections += [
+        section(t, w, 250, "blue", 0.28) for t in (0.0, np.pi / 2) for w in np.arange(0.05, 3.0, 0.1)
+    ]
+    result = simulate(CONFIG.format(tilt=TILT, end=80 * np.pi, samples=4001))
+    axes = matrices(result.values("quaternion"))
+    short, w = axes[:, :, 2], np.einsum("nij,nj->ni", axes, result.values("angular_velocity"))
+    time, spin = result.values("time") / (2 * np.pi), w / np.linalg.norm(w, axis=1)[:, None]
+    axes_of = ((short, "shortest axis", "blue"), (spin, "axis of rotation", "orange"))
+    away = [
+        Curve(time, np.degrees(np.arctan2(np.hypot(*one[:, :2].T), one[:, 2])), label, color, width=1)
+        for one, label, color in axes_of
+    ]
+    rates = []
+    for (name, one), color in zip(exponents.items(), ("blue", "orange"), strict=True):
+        label = f"{name}: {one.rate:.3f} ± {one.error:.3f} n"
+        rates += [Curve(np.arange(1, len(one.running) + 1), one.running, label, color),
+                  Curve(None, RATES[name], "", color, "--", 0.9)]  # fmt: skip
+    title = "Hyperion tumbles: no attitude in the chaotic zone or at the synchronous state lasts"
+    return Picture(title, "ab;cd", [
+        Panel("In the plane: section at pericentre (grey: the chaotic zone)",
+              "long axis from pericentre, mod 180 (deg)", "w at pericentre (n)", sections, more=named,
+              limits={"xlim": (0, 180), "ylim": (0, 3)}),
+        Panel("A tilt of 0.01 rad doesn't stay one", "time (revolutions)",
+              "angle from the orbit's normal (deg)", away, "y", legend="lower right"),
+        Panel("Where the axis of rotation points, in space", "longitude (deg)", "latitude (deg)",
+              more=pointing, limits={"xlim": (-180, 180), "ylim": (-90, 90)}),
+        Panel("Convergence (dashed: expected)", "revolutions", "largest Lyapunov rate so far (n)", rates, "x",
+              limits={"ylim": (0, 0.25)}, legend="upper right"),
+    ], (12, 9.5))  # fmt: skip
+
+
+if __name__ == "__main__":
+    raise SystemExit(study.main())

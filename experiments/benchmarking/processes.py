@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-SCRIPT = str(ROOT / "experiments" / "bare" / "free_body.py")
+BARE = ROOT / "experiments" / "bare"
 Figures = dict[str, float]
 """``cpu`` and ``wall`` seconds; ``peak``, MB of memory."""
 

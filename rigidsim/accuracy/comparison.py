@@ -65,7 +65,7 @@ def rows_to_compare(dataset: xarray.Dataset, most: int) -> np.ndarray:
     elif "quaternion" in dataset:
         attitudes = dataset["quaternion"].values
         turned = np.abs(np.einsum("ij,ij->i", attitudes[:-1], attitudes[1:]))
-        rates[1:] = np.arccos(np.minimum(turned, 1.0)) / np.diff(dataset["time"].values)
+        rates[1:] = np.arccos(np.minimum(turned, 1.0)) / np.abs(np.diff(dataset["time"].values))
     edges = np.linspace(0, count, most).astype(int)
     picked = [a + int(np.argmax(rates[a:b])) for a, b in pairwise(edges)]
     return np.unique([*picked, count - 1])

@@ -231,7 +231,7 @@ def side_by_side(
     end.
     """
     exponent = prepared.system.scaling.momentum
-    rotations = (end - begin) * max(rotation_rates(motion_at(average, states, exponent))) / _TURN
+    rotations = abs(end - begin) * max(rotation_rates(motion_at(average, states, exponent))) / _TURN
     count = int(min(max(_FEWEST_SAMPLES, _SAMPLES_PER_ROTATION * rotations), _MOST_SAMPLES))
     scene = _starting(prepared.scene, average, begin, end, states, exponent, count)
     if begin != float(prepared.scene.start):
@@ -245,7 +245,7 @@ def side_by_side(
     plain = reduced
     if back and not average.short_period:
         _, plain = _followed(prepared, scene, average, False, names, go_on)
-    times = np.linspace(0.0, end - begin, count)
+    times = np.linspace(0.0, abs(end - begin), count)
     apart = true["momentum_axis"] - reduced["momentum_axis"]
     growth, doubt = _growth(times, apart @ _along(plain["momentum_axis"]).T)
 
@@ -459,16 +459,17 @@ def measure_modelling(
     begin, end = float(scene.start), float(scene.samples.last)
     exponent = prepared.system.scaling.momentum
     at_start = average.initial(exponent)
-    length = min(_length(average, motion_at(average, at_start, exponent)), end - begin)
-    whole = end - begin <= _WHOLE * length
+    span, way = abs(end - begin), scene.samples.direction
+    length = min(_length(average, motion_at(average, at_start, exponent)), span)
+    whole = span <= _WHOLE * length
     places = [(begin, at_start, length)]
     if not whole:
         places += _places(prepared, average, trail, begin, end, length)
     windows: list[Window] = []
     for at, direction, length in places:
-        until = end if whole else at + length
+        until = end if whole else at + way * length
         windows.append(side_by_side(prepared, average, at, until, direction, go_on))
-    span, grown = end - begin, 0.0
+    grown = 0.0
     if whole:
         (window,) = windows
         oscillation, figure = window.recorded, window.recorded_figure
@@ -482,7 +483,7 @@ def measure_modelling(
         grown, oscillation = _extrapolated(prepared, average, windows, motions, span, carried)
         figure = max(w.recorded_figure or 0.0 for w in windows) if average.figure else None
         changes, growth = _changed(average, windows, span), grown / span
-        share = sum(w.kept.end - w.kept.start for w in windows) / span
+        share = sum(abs(w.kept.end - w.kept.start) for w in windows) / span
         steps = sum(w.kept.steps for w in windows)
         how = f"every rotation was resolved in {len(windows)} windows ({100 * share:.2g} % of "
         how += f"the run, {steps:,} steps), and the growth found there carried to its end"
@@ -528,13 +529,10 @@ def _places(
     """Middle and end: the nearest samples, with the states there, the momentum's direction first, and the
     lengths of the windows.
     """
-    context, exponent = prepared.scene.context, prepared.system.scaling.time
+    context, unit, way = prepared.scene.context, prepared.clock.unit, prepared.scene.samples.direction
     kept = [] if trail is None else trail.samples
-    seen = [
-        (math.ldexp(float(time), exponent), [context.mpf(float(x)) for x in state])
-        for _, time, state, _ in kept
-    ]
-    seen = [(at, state) for at, state in seen if at > begin + length]
+    seen = [(float(time) * unit, [context.mpf(float(x)) for x in state]) for _, time, state, _ in kept]
+    seen = [(at, state) for at, state in seen if way * (at - begin) > length]
     found: list[tuple[float, list[Any], float]] = []
     for middle in (True, False):
         if not seen:
@@ -542,14 +540,14 @@ def _places(
         last = length
         if average.driven is not None and not middle:  # a rotation that has become slower takes longer
             last = _length(average, motion_at(average, seen[-1][1], prepared.system.scaling.momentum))
-            last = min(max(last, length), (end - begin) / 2)
-        wanted = (begin + end) / 2 if middle else end - last
+            last = min(max(last, length), abs(end - begin) / 2)
+        wanted = (begin + end) / 2 if middle else end - way * last
         near = seen
         if average.driven is not None:  # whose course is known until the end alone
-            near = [place for place in seen if place[0] <= wanted] or seen[:1]
+            near = [place for place in seen if way * place[0] <= way * wanted] or seen[:1]
         at, state = min(near, key=lambda place: abs(place[0] - wanted))
         if average.driven is not None:
-            last = min(last, end - at)
+            last = min(last, abs(end - at))
         if last > 0 and all(at != other for other, _, _ in found):
             found.append((at, state, last))
     return found

@@ -85,8 +85,8 @@ def growth_of(prepared: InitialValueProblem, step: float, stepper: TaylorStepper
     """
     clock = prepared.clock
     steps = min(_FOLLOWED, math.ceil((float(clock.at(clock.count - 1)) - float(clock.start)) / step))
-    reached = float(prepared.scene.start) + math.ldexp(steps * step, prepared.system.scaling.time)
-    reached = min(reached, float(prepared.scene.samples.last))
+    begin, last = float(prepared.scene.start), float(prepared.scene.samples.last)
+    reached = begin + math.copysign(min(abs(steps * step * clock.unit), abs(last - begin)), last - begin)
     found = estimate_errors(prepared, steps, reached, stepper=stepper)
     assert found is not None
     return found
@@ -129,7 +129,7 @@ def motion_of(experiment: Experiment, *, loads: Sequence[Load] = ()) -> KnownMot
     return KnownMotion(
         steps=pilot.whole,
         rate=float(prepared.system.rate_bound),
-        seconds=float(scene.samples.last - scene.start),
+        seconds=abs(float(scene.samples.last - scene.start)),
         growth=growth_of(prepared, pilot.step, stepper),
         holds=any(i.name != "energy_balance" for i in prepared.system.invariants),
         exact=form.method if form else "",

@@ -168,7 +168,7 @@ def wanted(experiment: Experiment) -> float | None:
         if scene.position is None or scene.velocity is None:
             what = "given, but the scene has no position; give [initial] position or velocity"
             raise ConfigError(Problem("[integrator] accuracy_position", what), experiment.source)
-        seconds = float(scene.samples.last - scene.start)
+        seconds = abs(float(scene.samples.last - scene.start))
         size = math.hypot(*map(float, scene.position)) or math.hypot(*map(float, scene.velocity)) * seconds
         found.append(min(float(integrator.accuracy_position) / (size or 1.0), _MOST))
     return min(found) if found else None

@@ -124,7 +124,7 @@ def try_setting(
     """
     scene = trial_scene(experiment, setting, times, repeating=repeating)
     samples, early = scene.samples, 0
-    if samples.times is not None and samples.times[0] > samples.begin:
+    if samples.times is not None and samples.times[0] != samples.begin:
         # a motion begins at its first sample, which must be its start
         early, whole = 1, [samples.begin, *samples.times]
         scene = replace(scene, samples=SampleTimes.listed(samples.begin, whole, scene.context))
@@ -137,7 +137,7 @@ def try_setting(
 
     def check(progress: Progress) -> Status | None:
         nonlocal latest
-        if told is not None and time.monotonic() - latest > _TOLD_EVERY and length > 0:
+        if told is not None and time.monotonic() - latest > _TOLD_EVERY and length:
             latest = time.monotonic()
             told(setting.title, min(1.0, (progress.time - start) / length))
         return go_on(progress)

@@ -14,6 +14,7 @@ from rigidsim.analysis.refinement import at_nyquist
 from rigidsim.analysis.result import Analysis, SignalAnalysis, SpectralLine
 from rigidsim.analysis.signals import EquidistantTimes, Signal, clock_of, signals_of
 from rigidsim.errors import RigidsimError
+from rigidsim.scene.parts_of_values import in_time_order
 
 SPECTRUM_POINTS = 4000
 _BLEND = 0.05  # bins by which a line can be off that has absorbed closer ones
@@ -68,6 +69,7 @@ def analyse_dataset(
         )
     if order is not None and not 1 <= order <= 20:
         raise RigidsimError(f"given a window of order {order}; 1 to 20 are allowed")
+    dataset = in_time_order(dataset)
     clock = clock_of(dataset)
     raws = [_raw(signal, clock, lines, floor, order) for signal in signals_of(dataset, variables)]
     sizes = [[raw.factor * abs(complex(a)) for a in raw.found.sum.amplitudes] for raw in raws]

@@ -160,11 +160,14 @@ def resume(
 
 @_command("sweep")
 def verify(
-    run_path: options.RunPath, members: options.MembersOption = None, as_json: options.JsonOption = False
+    run_path: options.RunPath,
+    members: options.MembersOption = None,
+    back: options.ReversedOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Integrate the embedded config again and compare: identical, or what differs first. Exit code 1 then.
 
-    Example: rigidsim verify runs/intermediate_axis
+    Example: rigidsim verify runs/intermediate_axis --reversed
     """
 
 

@@ -118,6 +118,9 @@ ResumeWorkersOption = Annotated[
 MembersOption = Annotated[
     int | None, _option("--members", "N", "Of a sweep: how many members, drawn at random; default 100.")
 ]
+ReversedOption = Annotated[
+    bool, typer.Option("--reversed", help="Integrate to the end and back, too: how close does it return?")
+]
 PictureOption = Annotated[Path | None, _option("--png", "FILE", "Draw a picture, without a display.")]
 WebOption = Annotated[bool, typer.Option("--web", help="In the browser, served on loopback only.")]
 MomentOption = Annotated[

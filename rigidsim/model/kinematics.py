@@ -192,8 +192,8 @@ class Kinematics:
             return None
         first = self.surfaces.parameters
         first += sum(place.parameters(orbit) for orbit, place in self.tables.items())
-        unit, context = self.scaling.time, scene.context
-        return KernelStates(scene.ephemeris, sights, unit, scene.start, context, self.number, first)
+        start, context = scene.start, scene.context
+        return KernelStates(scene.ephemeris, sights, self.scaling, start, context, self.number, first)
 
     @property
     def piecewise(self) -> bool:

@@ -208,7 +208,7 @@ class _Samples:
         self._states = states
         self.matrices = np.array([_matrix(q) for q in states[first].T])
         unit = float(m.scene.context.ldexp(m.scene.context.one, m.scaling.time))
-        begin, end = float(m.scene.start) / unit, float(m.scene.end) / unit
+        begin, end = sorted(float(time) / unit for time in (m.scene.start, m.scene.end))
         cells = np.linspace(begin, end, _TIMES + 1)
         uniform = cells[:-1] + generator.uniform(0, 1, _TIMES) * np.diff(cells)
         self._span = end - begin

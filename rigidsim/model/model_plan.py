@@ -270,7 +270,8 @@ def refuse_odd_loads(scene: Scene, requirements: Requirements, loads: Sequence[L
         other = states.copy()
         other[rows] *= -1
         unit = float(scene.context.ldexp(scene.context.one, m.scaling.time))
-        times = generator.uniform(float(scene.start) / unit, float(scene.end) / unit, _STATES)
+        begin, end = sorted(float(time) / unit for time in (scene.start, scene.end))
+        times = generator.uniform(begin, end, _STATES)
         function = hy.cfunc([x for _, x in terms], list(hy.make_vars(*names)), compact_mode=True)
         with np.errstate(all="ignore"):
             here, there = (np.asarray(function(np.ascontiguousarray(s), time=times)) for s in (states, other))

@@ -169,7 +169,9 @@ def _alike(scene: Scene, scaling: Scaling) -> list[tuple[dict[str, Any], dict[st
     unit = context.ldexp(context.one, scaling.time)
     found = [(start_values(scene), {x.name: x.initial for x in scene.states})]
     for values in random_states(scene)[:_ALIKE]:
-        values["t"] = scene.start + unit * context.mpf(2.0 ** generator.uniform(0.0, _LATEST))
+        values["t"] = scene.start + scaling.direction * unit * context.mpf(
+            2.0 ** generator.uniform(0.0, _LATEST)
+        )
         for name, rate in zip(RATE_NAMES, fastest, strict=True):
             values[name] = rate * context.mpf(generator.uniform(-1, 1))
         parts = {x.name: context.mpf(generator.uniform(-1, 1)) for x in scene.states}

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import heyoka as hy
+import numpy as np
 
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix
 from rigidsim.scene.arithmetic import Matrix, Vector, cross, dot, norm
@@ -32,7 +33,10 @@ class Drive:
 
 @dataclass(frozen=True)
 class Scaling:
-    """Binary exponents of the internal units, in SI: one internal unit of time is ``2**time`` seconds."""
+    """Binary exponents of the internal units, in SI: one internal unit of time is ``2**time`` seconds.
+
+    The model is written in the time of the scene; ``System`` hands its equations on in internal time.
+    """
 
     time: int
     inertia: int
@@ -41,6 +45,15 @@ class Scaling:
     speed: int = 0
     drive: Drive | None = None  # the estimate used for loads of unknown size
     own: Mapping[str, int] = field(default_factory=dict)  # of user-defined states
+    direction: int = 1  # of internal time: -1 in a run that goes backwards
+
+    def internal(self, seconds: Any, context: Any) -> Any:
+        """A time of the scene (mpf, s) as internal time, which grows along every run."""
+        return context.ldexp(self.direction * seconds, -self.time)
+
+    def seconds(self, internal: Any) -> Any:
+        """The time of the scene, s, of an internal time (float64 or an array)."""
+        return self.direction * np.ldexp(internal, self.time)
 
     @property
     def momentum(self) -> int:
@@ -157,7 +170,7 @@ def _flight_scales(scene: Scene, drive: Drive | None) -> tuple[Any, Any]:
     bounds = [found for load in scene.loads if (found := load.flight_bounds(scene, fed)) is not None]
     if len(bounds) == 1 and scene.gravity is None:
         return bounds[0]
-    horizon = scene.end - scene.start
+    horizon = scene.duration
     pull = norm(context, scene.gravity) if scene.gravity is not None else context.zero
     swiftest = norm(context, scene.velocity) + pull * horizon + fed
     return norm(context, scene.position) + swiftest * horizon, swiftest
@@ -193,7 +206,7 @@ def choose_scaling(scene: Scene, drive: Drive | None = None) -> Scaling:
     fastest = context.maximum([fastest, source_rate(scene), gyroscopic_rate(scene), *met])
     time = -exponent(context, fastest)
     if fastest == 0:  # at rest for good: any unit will do, the horizon is the natural one
-        time = exponent(context, scene.end - scene.start)
+        time = exponent(context, scene.duration)
     rates = []
     for bound in bounds:
         relative = exponent(context, bound) + time if bound != 0 else 0
@@ -205,7 +218,8 @@ def choose_scaling(scene: Scene, drive: Drive | None = None) -> Scaling:
         flight = _flight_scales(scene, drive)
     length, speed = (exponent(context, size) for size in flight)
     inertia = exponent(context, max(body.principal_moments))
-    return Scaling(time, inertia, (rates[0], rates[1], rates[2]), length, speed, drive)
+    direction = scene.samples.direction
+    return Scaling(time, inertia, (rates[0], rates[1], rates[2]), length, speed, drive, direction=direction)
 
 
 # --- the scene's constants ----------------------------------------------------------------------------------

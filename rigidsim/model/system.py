@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -43,7 +44,9 @@ class Crossing:
 class System:
     """First-order equations with scaled states, and everything recorded as expressions of them.
 
-    Each part is worked out once, when it is first needed.
+    Each part is worked out once, when it is first needed. In a run that goes backwards internal time is the
+    scene's with the other sign: of equations written in the scene's time t every right-hand side changes its
+    sign, and t is minus the engine's time in all expressions.
 
     Attributes:
         plan: decisions made before anything was rounded; what follows are parts of it.
@@ -82,6 +85,17 @@ class System:
         if other.__dict__.get("partner") is not None:
             other.__dict__["partner"] = other.__dict__["partner"].with_coefficients(coefficients)
         return other
+
+    def begun_at(self, initial: Sequence[Any]) -> System:
+        """The same system from other states (mpf, internal units) on."""
+        other = copy.copy(self)
+        other.__dict__["_joined"] = replace(self._joined, initial=list(initial))
+        return other
+
+    @property
+    def coefficients(self) -> Rounder | None:
+        """What rounds the coefficients of the equations, if not as everything else."""
+        return self._coefficients
 
     @property
     def in_two_parts(self) -> bool:
@@ -150,7 +164,25 @@ class System:
         """(variable, right-hand side)."""
         if self._coefficients is not None:
             return System(self.plan, self._coefficients, chart=self._chart).equations
-        return list(zip(self.variables, self._joined.derivatives, strict=True))
+        rates = self._joined.derivatives
+        if self.scaling.direction < 0:
+            rates = [-rate for rate in self._in_internal_time(rates)]
+        return list(zip(self.variables, rates, strict=True))
+
+    def _in_internal_time(self, expressions: Sequence[Symbolic]) -> list[Symbolic]:
+        """Expressions of the scene's time as those of internal time."""
+        if self.scaling.direction > 0:
+            return list(expressions)
+        other = {hy.time: -hy.time}
+        if self.clocked:
+            second = hy.par[self.plan.surfaces.parameters]
+            other[second] = -second
+        return list(hy.subs([hy.expression(x) for x in expressions], other))
+
+    @property
+    def start(self) -> Any:
+        """Start of the motion in internal time (mpf)."""
+        return self.scaling.internal(self.scene.start, self.scene.context)
 
     @property
     def reasons(self) -> list[tuple[str, str]]:
@@ -215,7 +247,7 @@ class System:
                 if variable.continuity == "wrapped":
                     own = slice(variable.first, variable.first + variable.count)
                     outputs[own] = self.formulation.asked_angles(attitude, branch)
-        return recorded, outputs + drifts
+        return recorded, self._in_internal_time(outputs + drifts)
 
     @property
     def recorded(self) -> list[Recorded]:
@@ -232,7 +264,8 @@ class System:
     @cached_property
     def invariants(self) -> list[Invariant]:
         """All that is conserved."""
-        return find_invariants(self.mechanics.observed, list(self._joined.norms))
+        found = find_invariants(self.mechanics.observed, list(self._joined.norms))
+        return [replace(one, expressions=self._in_internal_time(one.expressions)) for one in found]
 
     @cached_property
     def crossings(self) -> list[Crossing]:
@@ -242,7 +275,8 @@ class System:
         m, found = self.mechanics, []
         for event in self.scene.events:
             (expression,) = written(m, [event.expression], clocked=False)
-            found.append(Crossing(event.name, expression, _DIRECTIONS[event.direction], event.stop))
+            direction = self.scaling.direction * _DIRECTIONS[event.direction]
+            found.append(Crossing(event.name, expression, direction, event.stop))
         endings = [(*one, False) for load in m.loads for one in load.endings(m)]
         endings += [
             (f"{expression.where} is negative", above_zero(m, expression), False)
@@ -251,7 +285,9 @@ class System:
         ]
         endings += [(*one, True) for load in m.loads for one in load.range_ends(m)]
         down = _DIRECTIONS["down"]
-        return found + [Crossing("", x, down, True, why, leaves_range) for why, x, leaves_range in endings]
+        found += [Crossing("", x, down, True, why, leaves_range) for why, x, leaves_range in endings]
+        meant = self._in_internal_time([one.expression for one in found])
+        return [replace(one, expression=x) for one, x in zip(found, meant, strict=True)]
 
     @property
     def events(self) -> list[Crossing]:
@@ -263,9 +299,10 @@ class System:
     @cached_property
     def pieces(self) -> Pieces | None:
         """What is set at given times, where steps must end; None without tables or bodies of a kernel."""
-        unit, start = self.scaling.time, self.scene.start
+        start = self.scene.start
         parts: list[PieceSeries] = [
-            TablePieces(orbit, place, unit, start, self.number) for orbit, place in self.plan.tables.items()
+            TablePieces(orbit, place, self.scaling, start, self.number)
+            for orbit, place in self.plan.tables.items()
         ]
         if (sky := self.mechanics.sky) is not None:
             parts += sky.pieces()
@@ -279,7 +316,8 @@ class System:
     @cached_property
     def surfaces(self) -> list[Symbolic]:
         """Arguments that vanish on switching surfaces; the parameter of the same number is the side, +-1."""
-        return written(self.mechanics, (surface.expression for surface in self.plan.surfaces.found))
+        found = (surface.expression for surface in self.plan.surfaces.found)
+        return self._in_internal_time(written(self.mechanics, found))
 
     @cached_property
     def turning(self) -> list[Symbolic]:

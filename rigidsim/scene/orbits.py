@@ -242,8 +242,9 @@ def resolve_tabulated_orbit(fields: Elements, strength: Any | None, around: Sett
     except TableError as error:
         raise around.fault(f"{fields.key}.table", f'given "{name}": {error}') from None
     times = orbit.table.times
-    if not (times[0] <= around.start and around.end <= times[-1]):
-        ends = times[0], times[-1], around.start, around.end
+    start, end = sorted((around.start, around.end))
+    if not (times[0] <= start and end <= times[-1]):
+        ends = times[0], times[-1], start, end
         first, last, start, end = (around.context.nstr(t, 8) for t in ends)
         what = (
             f'given "{name}", which reaches from t = {first} s to {last} s, but the run goes from {start} s '

@@ -30,11 +30,11 @@ class Time(ConfigTable):
     start: Second = ZERO
     """start of the run, to which [initial] refers"""
     end: Second | None = Field(None, examples=[1000.0, "10 yr"])
-    """end of the run; with samples or every"""
+    """end of the run; with samples or every. Before start, the run goes backwards in time"""
     samples: StrictInt | None = Field(None, examples=[10001])
     """number of samples, equally spaced from start to end, both included"""
     every: Second | None = Field(None, examples=[0.1, "1 day"])
-    """interval between samples, instead of samples"""
+    """interval between samples, instead of samples; above zero, backwards too"""
     times: (
         Annotated[
             Annotated[StrictStr, Tag(NAME_OR_VECTOR[0])] | Annotated[list[Second], Tag(NAME_OR_VECTOR[1])],
@@ -42,7 +42,7 @@ class Time(ConfigTable):
         ]
         | None
     ) = Field(None, examples=[[0, 1, 10, 100], "theirs.csv"])
-    """sample times, ascending, instead of end; or a CSV file next to the config with a column t or time"""
+    """sample times from start on, instead of end; or a CSV file next to the config with a column t or time"""
     epoch: Instant | None = Field(None, examples=["J2000", "2029-04-13T21:46:00 TDB"])
     """date of time 0, in TDB, TT, TAI, GPS or UTC; 2029-04-13T21:46:00Z, with or without quotes, is UTC"""
     unit: TimeUnitName | None = Field(None, examples=["day"])
@@ -51,7 +51,9 @@ class Time(ConfigTable):
 
 @dataclass(frozen=True)
 class SampleTimes:
-    """Exact sample times, s: ``begin + i * step``, or a list (with step zero) of times from ``begin`` on."""
+    """Exact sample times, s: ``begin + i * step``, or a list (with step zero) of times from ``begin`` on:
+    they descend if the run goes backwards.
+    """
 
     begin: Fraction
     step: Fraction
@@ -68,6 +70,11 @@ class SampleTimes:
     def exact_last(self) -> Fraction:
         """Time of the last sample."""
         return self.times[-1] if self.times is not None else self.begin + self.step * (self.count - 1)
+
+    @property
+    def direction(self) -> int:
+        """1 for a run that goes forwards in time, -1 for one that goes backwards."""
+        return -1 if self.exact_last < self.begin else 1
 
     @property
     def start(self) -> Any:
@@ -89,10 +96,10 @@ class SampleTimes:
     def largest_spacing(self) -> float:
         """Largest spacing of neighbouring samples, s."""
         if self.times is None:
-            return float(self.step)
+            return abs(float(self.step))
         if all(map(_is_double, self.times)):  # of which a difference is rounded once, too
-            return float(np.diff(self.doubles).max(initial=0.0))
-        return max((float(b - a) for a, b in pairwise(self.times)), default=0.0)
+            return float(np.abs(np.diff(self.doubles)).max(initial=0.0))
+        return max((abs(float(b - a)) for a, b in pairwise(self.times)), default=0.0)
 
 
 def _is_double(time: Fraction) -> bool:
@@ -152,43 +159,50 @@ def sample_times(table: Time, context: Any, texts: Mapping[str, str]) -> tuple[A
         if not times:
             raise _fail("times", "given an empty array; at least one time is needed")
         doubles = _doubles(times)
-        # rounding to doubles keeps order, so that only those that aren't told apart need a closer look
-        for i in np.flatnonzero(~(doubles[1:] > doubles[:-1])).tolist():
-            a, b = times[i], times[i + 1]
-            if not a < b:
-                raise _fail(f"times[{i + 1}]", f"given {shortly(b)} after {shortly(a)}; times must increase")
-        if times[0] < start:
-            raise _fail(
-                "times[0]", f"given {shortly(times[0])} s; start ({shortly(start)} s) or later is allowed"
-            )
         end = table.end.fraction(context) if table.end is not None else times[-1]
-        if times[-1] > end:
+        way = -1 if end < start else 1
+        order, after, before = (
+            ("increase", "later", "earlier") if way > 0 else ("decrease", "earlier", "later")
+        )
+        # rounding to doubles keeps order, so that only equal ones need a closer look
+        for i in np.flatnonzero(~(way * doubles[1:] > way * doubles[:-1])).tolist():
+            a, b = times[i], times[i + 1]
+            if not way * a < way * b:
+                raise _fail(f"times[{i + 1}]", f"given {shortly(b)} after {shortly(a)}; times must {order}")
+        if way * times[0] < way * start:
+            raise _fail(
+                "times[0]", f"given {shortly(times[0])} s; start ({shortly(start)} s) or {after} is allowed"
+            )
+        if way * times[-1] > way * end:
             raise _fail(
                 f"times[{len(times) - 1}]",
-                f"given {shortly(times[-1])} s; end ({shortly(end)} s) or earlier is allowed",
+                f"given {shortly(times[-1])} s; end ({shortly(end)} s) or {before} is allowed",
             )
         return rounded(start, context), rounded(end, context), SampleTimes.listed(start, times, context)
     if table.end is None:
         raise _fail("end", "missing; it must be given, unless times are")
     end = table.end.fraction(context)
-    if not end > start:
-        raise _fail("end", f"given {shortly(end)} s; after start ({shortly(start)} s) is allowed")
+    if end == start:
+        raise _fail(
+            "end", f"given {shortly(end)} s, which is start; a later time, or an earlier one, is allowed"
+        )
     if table.every is not None:
         step = table.every.fraction(context)
         if not step > 0:
             raise _fail("every", f"given {shortly(step)} s; a positive time is allowed")
         irrational = any(t is not None and t.pi_power for t in (table.start, table.end, table.every))
         slack = Fraction(1, 2**100) if irrational else 0  # an end on the grid is a sample, rounded or not
-        intervals = math.floor((end - start) / step + slack)
+        intervals = math.floor(abs(end - start) / step + slack)
         if intervals > _MOST_SAMPLES:
-            ratio = shortly((end - start) / step, 3)
+            ratio = shortly(abs(end - start) / step, 3)
             raise _fail("every", f"asks for {ratio} samples; at most 1e12 are allowed")
         if intervals == 0:
             raise _fail(
                 "every",
-                f"given {shortly(step)} s, longer than the whole run; at most end - start "
-                f"({shortly(end - start)} s) is allowed",
+                f"given {shortly(step)} s, longer than the whole run; at most {shortly(abs(end - start))} s "
+                "is allowed",
             )
+        step = step if end > start else -step
     else:
         count = table.samples if table.samples is not None else 1001
         if not 2 <= count <= _MOST_SAMPLES:

@@ -84,6 +84,11 @@ class Scene(Setting):
         return self.config.description
 
     @property
+    def duration(self) -> Any:
+        """Length of the run, s (mpf), whichever way it goes."""
+        return abs(self.end - self.start)
+
+    @property
     def torque_arm(self) -> Vector | None:
         """Mass times centre of mass (kg m, body axes) on which gravity acts; None without a torque."""
         if self.gravity is None or self.free_flight or self.body.mass is None:

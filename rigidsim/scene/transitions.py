@@ -112,7 +112,7 @@ def _of_switches(expression: Expression, context: Any) -> list[LineInTime]:
 
 
 def _within(line: LineInTime, scene: Scene) -> bool:
-    return bool(scene.start < line.zero < scene.end)
+    return bool(min(scene.start, scene.end) < line.zero < max(scene.start, scene.end))
 
 
 def _late(part: Expression, scene: Scene) -> bool:

@@ -177,8 +177,7 @@ def event_variables(
         if found:
             block = samples_at(found, prepared.precision)
             values, times = evaluator.evaluate_apart(block), block.times
-        exponent = prepared.clock.exponent
-        values["time"] = [np.ldexp(part, exponent) for part in prepared.precision.parts(times)]
+        values["time"] = prepared.clock.parts_of(times)
         while len(values["time"]) < prepared.clock.part_count:  # found by the engine: no label to be off
             values["time"].append(np.zeros(len(times)))
         if dates is not None:

@@ -58,7 +58,7 @@ class Dates:
         last = date.fromordinal(leap_seconds()[2] - 1)
         known = [parse_epoch(f"{day} UTC").julian_date() for day in ("1972-01-01", last)]
         zero = self.epoch.julian_date()
-        return known[0] <= zero + ends[0] / DAY and zero + ends[1] / DAY < known[1]
+        return known[0] <= zero + min(ends) / DAY and zero + max(ends) / DAY < known[1]
 
     @property
     def variables(self) -> list[Variable]:

@@ -69,10 +69,11 @@ class Diagnostics:
             acting = [effect.registered for effect in registered if not effect.rewrites]
             if acting:  # which a closed form knows nothing of
                 trail, beside = None, f"; they are without the effects {', '.join(acting)}"
+        last = float(self.prepared.scene.samples.last)
         found = estimate_errors(
             self.prepared,
             progress.steps,
-            min(progress.time, float(self.prepared.scene.samples.last)),
+            min(progress.time, last, key=lambda time: abs(time - float(self.prepared.scene.start))),
             trail=trail,
             waypoints=None if corrected is None else corrected.effect(Waypoints),
             stepper=stepper,
@@ -247,7 +248,8 @@ class Diagnostics:
     def _since(self, found: Estimate) -> str:
         if found.predictable_seconds is None or found.growth_rate == 0.0:
             return ""
-        since = float(self.prepared.scene.start) + found.predictable_seconds
+        scene = self.prepared.scene
+        since = float(scene.start) + scene.samples.direction * found.predictable_seconds
         folding = span_text(1 / found.growth_rate)
         return f" from about {self._words.moment(since, 3)} on (errors grow e-fold every {folding})"
 

@@ -108,7 +108,9 @@ def _why_it_broke(prepared: InitialValueProblem, time: float) -> str:
             if width is None:
                 continue
             near = width < _NARROW * spacing * abs(moment)
-            if near and scene.start < moment < scene.end and moment > time - _NARROW * spacing * abs(time):
+            way = scene.samples.direction
+            ahead = way * (moment - time) > -_NARROW * spacing * abs(time)
+            if near and ahead and way * scene.start < way * moment < way * scene.end:
                 when = time_words(scene).moment(float(moment))
                 return (
                     f'; "{part.text}" ({part.where}) changes at {when} within '

@@ -80,7 +80,8 @@ def kept_of_series(
 def _indicators(one: MemberSeries, times: np.ndarray, keep: Collection[str]) -> Kept:
     """Chaos indicators from the growth of a tangent vector."""
     since = times if times.ndim == 1 else times.T
-    told = indicators(since, one.parts[0][:, :, 0].T)
+    way = -1.0 if since.size and (since[-1] < since[0]).any() else 1.0  # growth is that along the run
+    told = indicators(way * since, one.parts[0][:, :, 0].T)
     labels = {
         "megno": ("1", "mean exponential growth of nearby orbits: 2 for regular motion", told.megno),
         "fli": ("1", "fast Lyapunov indicator: largest logarithm of the growth", told.fli),
@@ -91,7 +92,7 @@ def _indicators(one: MemberSeries, times: np.ndarray, keep: Collection[str]) -> 
         if name in keep:
             found[name] = kept(values, units, long_name, name)
             until = "time up to which the growth of a tangent vector is known"
-            found["growth_time"] = kept(told.until, "s", until, name)
+            found["growth_time"] = kept(way * told.until, "s", until, name)
     return found
 
 

@@ -244,7 +244,7 @@ class Recorder(SampleReceiver):
 
     def _note_lost_turns(self) -> None:
         lost = self._evaluator.continuity.wrapped_from
-        self.statistics.angles_wrapped_from = math.ldexp(lost, self._prepared.clock.exponent)
+        self.statistics.angles_wrapped_from = lost * self._prepared.clock.unit
 
     def _wanted(self, recorded: RecordedParts, put_back: Mapping[str, np.ndarray]) -> int:
         """Number of samples up to and including the first past the drift guard; more than all if none is.

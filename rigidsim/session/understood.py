@@ -71,7 +71,7 @@ def span_of(scene: Scene) -> Span:
         start_s=float(scene.start),
         end_s=float(samples.last),
         samples=samples.count,
-        every_s=None if samples.times is not None else float(samples.step),
+        every_s=None if samples.times is not None else abs(float(samples.step)),
         epoch="" if scene.epoch is None else str(scene.epoch),
         unit=scene.config.time.unit or "",
     )

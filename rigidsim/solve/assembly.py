@@ -1,6 +1,5 @@
 """Assembly of what solves a prepared scene: stepper, effects, evaluation."""
 
-import math
 from dataclasses import dataclass, replace
 
 from rigidsim.solve.compiled import interruptible
@@ -134,7 +133,7 @@ def _following(check: Check, evaluator: Evaluator, clock: SampleClock) -> Check:
         stop = check(progress)
         if stop is not None or progress.next_sample >= clock.count:
             return stop
-        reached = math.ldexp(progress.time, -clock.exponent)
+        reached = progress.time / clock.unit
         try:
             evaluator.follow(min(reached, float(clock.at(progress.next_sample))))
         except KeyboardInterrupt:  # while what follows them was compiled

@@ -134,7 +134,7 @@ class KeyTangents:
         self._slopes = [derivatives.along(row, along, self._first_slope) for row in outputs]
         self._options = dict(precision.options, compact_mode=self._lanes is None)
         context = system.scene.context
-        self._start = precision.number(context.ldexp(system.scene.start, -system.scaling.time))
+        self._start = precision.number(system.start)
         units = [context.ldexp(context.one, e) for one in made.recorded for e in one.exponents]
         self._units = precision.array(units)
         self.use(made.coefficients)

@@ -88,9 +88,9 @@ class Evaluator:
         self._wrapping = wrapping
         self._outputs = self._compile(system.outputs) if system.outputs else None
         components = [x for invariant in system.invariants for x in invariant.expressions]
-        self._invariants = self._compile(components)
+        self._invariants = self._compile(components or system.variables[:1])  # of a motion that keeps nothing
         initial = precision.array(system.initial)
-        start = precision.array([system.scene.context.ldexp(system.scene.start, -system.scaling.time)])
+        start = precision.array([system.start])
         begun = evaluate_rows(self._invariants, initial[None, :], times=start) if components else None
         self.initial = initial[:0] if begun is None else begun[:, 0]
         self._parameters = len(components)

@@ -7,7 +7,6 @@ too.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -214,7 +213,7 @@ def of_order_one(
 def _bits(system: System, expressions: Sequence[hy.expression]) -> list[int]:
     """Binary exponents, at least 0, of the largest values over the run's time and states of order one."""
     scene, scaling = system.scene, system.scaling
-    start, end = (math.ldexp(float(t), -scaling.time) for t in (scene.start, scene.samples.last))
+    start, end = (float(scaling.internal(t, scene.context)) for t in (scene.start, scene.samples.last))
     random = np.random.default_rng(0)
     states = random.uniform(-1.0, 1.0, (STATES, len(system.states)))
     states[0] = [float(x) for x in system.initial]

@@ -101,4 +101,4 @@ def _sides(system: System, precision: Precision) -> dict[str, Any]:
 
 
 def _start(system: System, precision: Precision) -> Any:
-    return precision.number(system.scene.context.ldexp(system.scene.start, -system.scaling.time))
+    return precision.number(system.start)

@@ -70,8 +70,7 @@ class AnyStart:
     @property
     def _exact_start(self) -> Any:
         """Internal units, mpf."""
-        scene = self._system.scene
-        return scene.context.ldexp(scene.start, -self._system.scaling.time)
+        return self._system.start
 
     @property
     def _start(self) -> Any:
@@ -96,7 +95,7 @@ class FromStates(AnyStart):
         return np.ldexp(1.0, np.array(self._system.state_exponents))
 
     def _internal(self, times: np.ndarray) -> np.ndarray:
-        return np.ldexp(times, -self._system.scaling.time)
+        return self._system.scaling.direction * np.ldexp(times, -self._system.scaling.time)
 
     def motion(self, times: np.ndarray) -> np.ndarray:
         """The scene's own states (rows, states), internal units, at ascending times (s)."""
@@ -146,7 +145,7 @@ class FromStates(AnyStart):
             added: angular accelerations (rows, 3), rad/s^2, body axes, beside the equations' own.
         """
         found = evaluate_rows(self._derivatives, states, times=self._internal(times)).T
-        found = np.ldexp(found, -self._system.scaling.time)
+        found = self._internal(found)
         if added is not None:
             found[:, self._places[4:]] += added / self._scales[self._places[4:]]
         return found

@@ -183,7 +183,7 @@ def prepare_scene(
             system = system.with_coefficients(parts)
         if not holds and scene.config.integrator.hold_invariants and algorithm.method.has_steps:
             late = _is_worth_holding(system)
-        clock = SampleClock(scene.samples, precision, system.scaling.time)
+        clock = SampleClock(scene.samples, precision, system.scaling)
         prepared = InitialValueProblem(
             experiment, scene, precision, system, clock, step_control, algorithm, tuple(loads), late
         )

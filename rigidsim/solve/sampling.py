@@ -13,6 +13,7 @@ import numpy as np
 from mpmath.libmp import from_rational, round_nearest
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.scaling import Scaling
 from rigidsim.scene.exact import rounded
 from rigidsim.scene.sample_times import SampleTimes
 from rigidsim.solve.precision import Precision, Scalar, precision_of
@@ -21,19 +22,20 @@ _BLOCK = 65536  # samples of a list that are looked at together
 
 
 class SampleClock:
-    """Times of the samples, block by block; ``exponent`` is that of the internal unit of time.
+    """Times of the samples, block by block, as the scene has them and in internal time, which grows.
 
     Attributes:
         start: start of the motion, a scalar of the precision; a list of times may begin later.
+        unit: seconds of the scene in one of internal time, a power of two; below zero in a run backwards.
         part_count: number of float64 that hold a label together with its residual to the integration's time.
 
     Raises:
         ConfigError: neighbouring samples fall on the same number of this precision.
     """
 
-    def __init__(self, samples: SampleTimes, precision: Precision, exponent: int) -> None:
+    def __init__(self, samples: SampleTimes, precision: Precision, scaling: Scaling) -> None:
         self.count = samples.count
-        self.exponent = exponent
+        self._scaling, self.unit = scaling, float(scaling.seconds(1.0))
         self.part_count = precision.part_count if precision.bits == 53 else max(2, precision.part_count)
         self._precision = precision
         self._double = precision_of("double")
@@ -42,9 +44,9 @@ class SampleClock:
         self._first = int(samples.begin * self._divisor)
         self._step = int(samples.step * self._divisor)
         self._whole = {kind.bits: self._exact_numbers(kind) for kind in (precision, self._double)}
-        unit = samples.context.mpf(2) ** exponent
-        self._per_second = precision.number(1 / unit)
-        self.start = precision.number(rounded(samples.begin, samples.context) / unit)
+        context = samples.context
+        self._per_second = precision.number(scaling.internal(context.one, context))
+        self.start = precision.number(scaling.internal(rounded(samples.begin, context), context))
         self._refuse_coinciding(samples)
 
     def internal(self, first: int, stop: int) -> np.ndarray:
@@ -58,7 +60,11 @@ class SampleClock:
     def seconds(self, time: Scalar) -> float:
         """The double nearest to a time in internal units, s."""
         alone = np.array([time], dtype=self._precision.scalar)
-        return float(np.ldexp(self._precision.parts(alone)[0][0], self.exponent))
+        return float(self._scaling.seconds(self._precision.parts(alone)[0][0]))
+
+    def parts_of(self, times: np.ndarray) -> list[np.ndarray]:
+        """Any times in internal units as float64 parts, s."""
+        return [self._scaling.seconds(part) for part in self._precision.parts(times)]
 
     def labels(self, first: int, stop: int) -> np.ndarray:
         """The double nearest to the time of each sample first ... stop-1, s."""
@@ -90,12 +96,12 @@ class SampleClock:
 
     def _fits(self, index: int, precision: Precision) -> bool:
         """Whether what is divided for a sample of a grid, and for all before, fits the significand."""
-        return max(self._step * index, abs(self._numerator(index))) <= 2**precision.bits
+        return max(abs(self._step * index), abs(self._numerator(index))) <= 2**precision.bits
 
     def _exact_numbers(self, precision: Precision) -> tuple[Scalar, Scalar, Scalar] | None:
         """The numbers a, b and d; None if one of them doesn't fit the significand."""
         a, b, d = self._first, self._step, self._divisor
-        if max(abs(a), b, d) > 2**precision.bits:
+        if max(abs(a), abs(b), d) > 2**precision.bits:
             return None
         return _nearest(a, 1, precision), _nearest(b, 1, precision), _nearest(d, 1, precision)
 

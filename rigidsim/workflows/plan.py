@@ -206,7 +206,7 @@ def plan(
     corrected = parts.steps()
     pilot = timed_pilot(prepared, corrected, pilot_seconds)
     step = math.ldexp(pilot.step, prepared.system.scaling.time)
-    duration = float(prepared.scene.samples.last - prepared.scene.start)
+    duration = abs(float(prepared.scene.samples.last - prepared.scene.start))
     steps = max(1.0, duration / step)
     samples = prepared.clock.count
     room = storage(prepared, Path(out) / prepared.scene.name)

@@ -162,16 +162,16 @@ class Tangents:
 
     def _internal(self, times: np.ndarray) -> np.ndarray:
         """Times in the units of the equations, in the run's precision."""
-        scene = self._parametrised.plain.scene
-        if times.ndim != 1 or not np.isfinite(times).all() or (np.diff(times) < 0).any():
-            what = "given others; finite times in ascending order, in a plain sequence, are allowed"
+        scene, scaling = self._parametrised.plain.scene, self._parametrised.plain.scaling
+        way = scaling.direction
+        order, side = ("ascending", "later") if way > 0 else ("descending", "earlier")
+        if times.ndim != 1 or not np.isfinite(times).all() or (way * np.diff(times) < 0).any():
+            what = f"given others; finite times in {order} order, in a plain sequence, are allowed"
             raise ConfigError(Problem("times", what), self._source)
-        if len(times) and times[0] < scene.start:
-            what = (
-                f"given {times[0]:g} s, before the start at {float(scene.start):g} s; later times are allowed"
-            )
-            raise ConfigError(Problem("times", what), self._source)
-        return self._precision.of_doubles(np.ldexp(times, -self._parametrised.plain.scaling.time))
+        if len(times) and way * times[0] < way * scene.start:
+            what = f"given {times[0]:g} s, where the run starts at {float(scene.start):g} s; "
+            raise ConfigError(Problem("times", what + f"{side} times are allowed"), self._source)
+        return self._precision.of_doubles(way * np.ldexp(times, -scaling.time))
 
     def _told(self, times: np.ndarray, rows: Rows) -> Sensitivities:
         quaternion, by = rows.values["quaternion"], rows.slopes

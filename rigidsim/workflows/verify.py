@@ -10,6 +10,7 @@ import numpy as np
 import xarray
 from pydantic import BaseModel
 
+from rigidsim.accuracy.reversal import Reversal, there_and_back
 from rigidsim.errors import RESUME, RigidsimError, RunFolderError, run_again
 from rigidsim.session.session import Observer
 from rigidsim.solve.status import Status
@@ -48,7 +49,8 @@ class Difference:
 @dataclass(frozen=True)
 class Verdict:
     """Result of a verification: identical if every number of every variable agrees in every bit, the files
-    are whole, and the summary's claims hold; ``environment``: what changed since, which may explain the rest.
+    are whole, and the summary's claims hold; ``environment``: what changed since, which may explain the rest;
+    ``reversal``: how close the motion comes back to its start, if that was asked for.
     """
 
     path: str
@@ -58,21 +60,26 @@ class Verdict:
     differing: list[str] = field(default_factory=list)
     environment: list[str] = field(default_factory=list)
     samples: int = 0
+    reversal: Reversal | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Values for JSON."""
         first = self.difference
         told = asdict(self) | {"first_difference": first and asdict(first) | {"size": first.size}}
         told["differing_variables"] = told.pop("differing")
+        back = self.reversal
+        told["reversal"] = back and asdict(back) | {"words": back.words}
         del told["difference"]
         return told
 
 
-def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
+def verify(path: str | Path, *, reversed: bool = False, observer: Observer | None = None) -> Verdict:
     """Integrate a run's embedded config again and compare all recorded numbers and the summary's claims.
 
     Args:
         path: run folder with a dataset, or a dataset alone.
+        reversed: whether the motion is integrated to its end and back, too. A difference of more than ten
+            times both ways' announced errors counts as a problem.
         observer: receives the integration's progress.
 
     Raises:
@@ -108,9 +115,13 @@ def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
     for name, then, value in saved.changed(Use.SETTING, now):
         problems.append(f"{name} is {then} in the dataset, {value} when run again")
     changed = [f"{name} {then} -> {value}" for name, then, value in saved.changed(Use.PLATFORM, now)]
+    reversal = there_and_back(experiment) if reversed else None
+    if reversal is not None and reversal.beyond:
+        problems.append(f"{dataset}: {reversal.words}")
     if saved.mixed_provenance:
         changed.append(f"the run itself was put together on different machines: {saved.mixed_provenance}")
-    return Verdict(str(dataset), not problems and not differing, problems, first, differing, changed, samples)
+    identical = not problems and not differing
+    return Verdict(str(dataset), identical, problems, first, differing, changed, samples, reversal)
 
 
 def _scratch() -> tempfile.TemporaryDirectory[str]:

@@ -240,7 +240,7 @@ def test_refused_with_a_message_that_helps(
             {
                 "body": "principal_moments = [1, 2, 4]",
                 "initial": "angular_velocity = [1, 0, 0]\nquaternion = [0, 0, 0, 0]",
-                "time": "end = -1",
+                "time": "end = 0",
                 "limits": "wall_time = 0",
             },
             ["[body] principal_moments", "[initial] quaternion", "[limits] wall_time", "[time] end"],

@@ -113,14 +113,17 @@ def _plan(experiment: Experiment, budget: float) -> Plan:
     short = min(part, quadruple if form else min(quadruple, digits))
     early = _grid(start, end, short, _SHORT_SAMPLES) if short < part else ()
     # the start is a sample, so that the motion begins there
-    times = tuple(sorted({start, *early, *_grid(start, end, part, _SAMPLES)}))
-    less = tuple(t for t in times if t <= (early or times)[-1])
+    since = sorted({start, *early, *_grid(start, end, part, _SAMPLES)}, key=lambda time: abs(time - start))
+    times = tuple(since)
+    less = times[: times.index((early or times)[-1]) + 1]
     exact = form.method if form else ""
-    return Plan(end - start, pilot.whole, scene.samples.count, part, short, times, less, exact, why)
+    return Plan(abs(end - start), pilot.whole, scene.samples.count, part, short, times, less, exact, why)
 
 
 def _grid(start: float, end: float, part: float, count: int) -> tuple[float, ...]:
     """Times over the first part of a motion that are exact in single precision too."""
+    if end < start:
+        return tuple(-time for time in _grid(-start, -end, part, count))
     exact = start + (end - start) * part * np.arange(1, count + 1) / count
     rounded = exact.astype(np.float32)
     rounded = np.where(rounded > exact, np.nextafter(rounded, np.float32(-np.inf)), rounded)

@@ -190,7 +190,7 @@ def estimate_errors(
     if not prepared.has_steps:
         return _everywhere(prepared, CLOSED_FORM * epsilon, "a few roundings of the closed form")
     start = float(prepared.clock.start)
-    end = start + math.ldexp(reached - float(scene.start), -prepared.system.scaling.time)
+    end = start + math.ldexp(abs(reached - float(scene.start)), -prepared.system.scaling.time)
     if steps == 0 or end <= start:
         how = "the rounding of the start, which the run didn't leave"
         return _everywhere(prepared, LAST_BITS * epsilon, how)
@@ -365,7 +365,8 @@ def _distances(name: str, one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 def label_rounding(prepared: InitialValueProblem, seconds: float) -> float:
     """Rounding error of sample times, s."""
-    late = max(abs(float(prepared.scene.start)), abs(float(prepared.scene.start) + seconds))
+    start = float(prepared.scene.start)
+    late = max(abs(start), abs(start + prepared.scene.samples.direction * seconds))
     return LABEL * float(prepared.precision.epsilon) * late
 
 

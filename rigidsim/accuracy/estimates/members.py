@@ -116,7 +116,8 @@ class MemberEstimates:
         units = numbers.whole_numbers(scaling.time)[places]
         seconds = block.times[block.reached[some] - 1]
         begin_seconds = float(self._prepared.scene.start)
-        begin, duration = np.ldexp(begin_seconds, -units), seconds - begin_seconds
+        way = self._prepared.scene.samples.direction
+        begin, duration = way * np.ldexp(begin_seconds, -units), way * (seconds - begin_seconds)
         exponents = [
             numbers.whole_numbers(system.state_exponents[place])[places]
             for place in self._measures.places["rates"]

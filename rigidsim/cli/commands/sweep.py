@@ -79,10 +79,12 @@ def resume(
     return _print(result, as_json)
 
 
-def verify(run_path: Path, members: int | None, as_json: bool) -> int:
+def verify(run_path: Path, members: int | None, back: bool, as_json: bool) -> int:
     """Integrate again and compare."""
     if not is_sweep(run_path):
         refuse_options(f"is for sweeps; {run_path} is compared as a whole", members=members)
+    if is_sweep(run_path) or is_fit(run_path):
+        refuse_options(f"is for single runs, and {run_path} is none", reversed=back)
     if is_fit(run_path):
         from rigidsim.cli.commands import fit
 
@@ -91,7 +93,7 @@ def verify(run_path: Path, members: int | None, as_json: bool) -> int:
         verdict, what = verify_sweep(run_path, members=MEMBERS if members is None else members), "member"
     else:
         with progress.observer() as observer:
-            verdict, what = verifying.verify(run_path, observer=observer), "sample"
+            verdict, what = verifying.verify(run_path, reversed=back, observer=observer), "sample"
     told = verdict.as_dict()
     answer(as_json, told, print_verdict, told, what)
     return 0 if verdict.identical else 1

@@ -194,6 +194,8 @@ def print_verdict(verdict: dict[str, Any], what: str = "sample") -> None:
         on.say(f"different: {verdict['path']}")
     for problem in verdict["problems"]:
         on.say(f"  {problem}")
+    if (reversal := verdict.get("reversal")) is not None:
+        on.say(f"  {reversal['words']}")
     first = verdict["first_difference"]
     if first is not None:
         on.say(

@@ -18,6 +18,7 @@ from rigidsim.look.pages import numbers
 from rigidsim.look.plots import Plot, moves
 from rigidsim.look.thinning import thin
 from rigidsim.look.units import clock
+from rigidsim.scene.parts_of_values import in_time_order
 from rigidsim.scene.readable import span_text, unit_for
 
 ROWS = 20_000  # that a figure draws
@@ -46,6 +47,7 @@ class Shown:
 
 def shown_rows(dataset: xarray.Dataset) -> Shown:
     """Read the rows that a figure draws of a dataset, possibly lazy."""
+    dataset = in_time_order(dataset)
     rows = start = thin(dataset, ROWS).assign_attrs(dataset.attrs)
     if dataset.sizes["time"] > rows.sizes["time"]:
         start = thin(dataset.isel(time=slice(0, ROWS)), ROWS).assign_attrs(dataset.attrs)

@@ -16,6 +16,7 @@ from rigidsim.look.solids import Array, Color
 from rigidsim.look.timeline.blueprint import build_comparison
 from rigidsim.look.timeline.drawn import Clock, DrawnRun, build_clock, dated
 from rigidsim.look.timeline.writing import chunks, recording_to
+from rigidsim.scene.parts_of_values import in_time_order
 from rigidsim.scene.readable import epoch_of
 from rigidsim.scene.row_rotations import angles_between
 
@@ -37,7 +38,7 @@ def write_comparison(
     """
     if not 2 <= len(named) <= MOST:
         raise ValueError(f"given {len(named)} runs; 2 to {MOST} can be seen side by side")
-    runs = [(name, DrawnRun.of(dataset, rows)) for name, dataset in named]
+    runs = [(name, DrawnRun.of(in_time_order(dataset), rows)) for name, dataset in named]
     clock = build_clock(np.unique(np.concatenate([run.seconds for _, run in runs])))
     first, *others = [epoch_of(run.rows.attrs) for _, run in runs]
     shown = dated(clock, first) if all(epoch == first for epoch in others) else clock

@@ -16,6 +16,7 @@ from rigidsim.look.page import legible
 from rigidsim.look.signals import title_of
 from rigidsim.look.timeline.blueprint import build_blueprint
 from rigidsim.look.timeline.drawn import DrawnRun
+from rigidsim.scene.parts_of_values import in_time_order
 
 LIVE_ROWS = 100_000
 CHUNK = 4096  # rows per chunk: larger ones make the viewer slow, smaller ones heavy
@@ -41,7 +42,7 @@ def write_timeline(
     RuntimeError: the environment variable RERUN switches recording off.
     OSError: the file can't be written, or there is no room for it.
     """
-    run = DrawnRun.of(dataset, rows)
+    run = DrawnRun.of(in_time_order(dataset), rows)
     count = len(run.steps)
     with recording_to(path, title_of(dataset), count, build_blueprint(run, part=part)) as recording:
         run.draw_static(recording)

@@ -162,6 +162,8 @@ def driven_by(
         axial -= context.ldexp(context.mpf(float(removed[0])), exponent)
         across -= context.ldexp(context.mpf(float(removed[1])), exponent)
         start = [float(context.ldexp(x, -exponent)) for x in (axial, across)]
+    if scaling.direction < 0:
+        raise refused(level, "torques that change the size of the momentum aren't averaged backwards in time")
     begin, end = (float(context.ldexp(x, -scaling.time)) for x in (scene.start, scene.end))
     times, course, fastest, failure = _followed(torques, np.array(start), begin, end)
     if failure:

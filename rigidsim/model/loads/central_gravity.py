@@ -180,7 +180,7 @@ class CentralGravity(PointAttraction):
     def flight_bounds(self, scene: Scene, fed: Any) -> tuple[Any, Any]:
         context, strength = scene.context, self.gravitational_parameter
         assert scene.position is not None
-        horizon = scene.end - scene.start
+        horizon = scene.duration
         _, distance, energy = self._start(scene)
         swiftest = context.sqrt(2 * abs(energy + strength / self.nearest_approach(scene)))
         if energy < 0:

@@ -274,9 +274,8 @@ def _refuse_odd_mantle(core: FluidCore, body: RigidBody, context: Any) -> None:
 
 def _refuse_stiff(core: FluidCore, friction: Any, around: Setting) -> None:
     """Refuse a friction whose steps no run ends with."""
-    begin, end = around.start, around.end
     damping = core.friction / (core.polar * (1 - core.flattening))
-    if damping * (end - begin) > _MOST_DAMPED:
+    if damping * abs(around.end - around.start) > _MOST_DAMPED:
         time = value_text(1 / plain(damping), "s")
         what = (
             f"given {_text(friction)} s^-1, which takes this core to the mantle's rate in {time}, and steps "

@@ -81,7 +81,7 @@ def energy_scale(m: Mechanics, *, kept: bool = False) -> tuple[Any, str]:
     if m.velocity is None or scene.velocity is None:
         return scale, name
     pull = norm(context, scene.gravity) if scene.gravity else context.zero
-    swiftest = norm(context, scene.velocity) + pull * (scene.end - scene.start)
+    swiftest = norm(context, scene.velocity) + pull * scene.duration
     if m.scaling.drive is not None:
         swiftest += m.scaling.drive.speed
     flight = scene.body.mass * swiftest**2 / 2

@@ -28,7 +28,7 @@ import numpy as np
 
 from rigidsim.model.orbits.pieces import PieceSeries
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.scaling import Rounder
+from rigidsim.model.scaling import Rounder, Scaling
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.kernels.ephemeris import Ephemeris
@@ -71,13 +71,14 @@ class KernelStates:
         self,
         ephemeris: Ephemeris,
         given: Sequence[tuple[Sight, int]],
-        time_exponent: int,
+        scaling: Scaling,
         start: Any,
         context: Any,
         number: Rounder,
         first: int,
     ) -> None:
-        self.ephemeris, self._exponent, self._start = ephemeris, time_exponent, start
+        self.ephemeris, self._exponent, self._start = ephemeris, scaling.time, start
+        self._scaling = scaling
         self._context, self._number = context, number
         self.sights = list(dict.fromkeys(sight for sight, _ in given))
         orders: dict[int, int] = {}
@@ -188,32 +189,35 @@ class KernelStates:
     def _pieces(self, group: _Blocks) -> BlockPieces:
         context, ahead = self._context, self.ephemeris.ahead
         now, one = self._start + exactly(context, ahead), group.series[0][0]
-        begun = one.block_at(now)
-        last = min(math.ceil((series.end - one.begin) / one.length) for series, _ in group.series)
-        last = min(last, one.block_at(self.ephemeris.run[1] + exactly(context, ahead)) + _BEYOND)
-        knots = []
-        for block in range(begun + 1, last):
-            edge = exactly(context, one.begin + block * group.length - ahead)
-            knots.append(self._number(context.ldexp(edge, -self._exponent)))
-        return BlockPieces(group, begun, knots, self._exponent, context, self._number)
+        begun, back = one.block_at(now), self._scaling.direction < 0
+        end = one.block_at(self.ephemeris.run[1] + exactly(context, ahead))
+        if back:
+            first = max(math.ceil((series.begin - one.begin) / one.length) for series, _ in group.series)
+            edges = range(begun, max(first, end - _BEYOND), -1)
+        else:
+            last = min(math.ceil((series.end - one.begin) / one.length) for series, _ in group.series)
+            edges = range(begun + 1, min(last, end + _BEYOND))
+        times = (exactly(context, one.begin + edge * group.length - ahead) for edge in edges)
+        knots = [self._number(self._scaling.internal(time, context)) for time in times]
+        return BlockPieces(group, begun, knots, self._scaling, context, self._number)
 
 
 class BlockPieces:
     """Blocks of series of one length (see ``rigidsim.model.orbits.pieces.PieceSeries``)."""
 
     def __init__(
-        self, group: _Blocks, begun: int, knots: list[Any], exponent: int, context: Any, number: Rounder
+        self, group: _Blocks, begun: int, knots: list[Any], scaling: Scaling, context: Any, number: Rounder
     ) -> None:
         self.knots, self._group, self._context, self._number = knots, group, context, number
+        self._step = scaling.direction
         self._series = []
         for series, carried in group.series:
             behind = round((group.series[0][0].begin - series.begin) / group.length)
             self._series.append((series, carried, begun + behind))
-        rate = exactly(context, Fraction(2) ** (exponent + 1) / group.length)
+        rate = exactly(context, Fraction(2) ** (scaling.time + 1) / group.length)
+        entered = -scaling.direction * context.one  # u where blocks are entered
         self._ends = {
-            (series.terms, order): [
-                rate**order * x for x in chebyshev(context, -context.one, series.terms, order)
-            ]
+            (series.terms, order): [rate**order * x for x in chebyshev(context, entered, series.terms, order)]
             for series, carried, _ in self._series
             for order in range(carried + 1)
         }
@@ -230,12 +234,12 @@ class BlockPieces:
         return names
 
     def numbers(self, first: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
-        """See ``PieceSeries``: u is -1 where a block begins, and its parameters are the coefficients, each of
-        which is a double times a power of two.
+        """See ``PieceSeries``: u is -1 where a block begins and 1 where it ends, and its parameters are the
+        coefficients, each of which is a double times a power of two.
         """
-        parameters, states = [], [self._exact(np.full((stop - first, 1), -1.0))]
+        parameters, states = [], [self._exact(np.full((stop - first, 1), -float(self._step)))]
         for (series, carried, begun), rows in zip(self._series, self._rows, strict=True):
-            blocks = rows[begun + first : begun + stop]
+            blocks = rows[begun + self._step * np.arange(first, stop)]
             scaled = np.ldexp(blocks[:, :, carried + 1 :], -series.exponent)
             parameters.append(self._exact(scaled.reshape(len(blocks), -1)))
             states += [self._at_edges(series, blocks, order) for order in range(carried + 1)]
@@ -248,7 +252,7 @@ class BlockPieces:
         return np.array(numbers, dtype=self._kind).reshape(values.shape)
 
     def _at_edges(self, series: BlockSeries, blocks: np.ndarray, order: int) -> np.ndarray:
-        """Values of three states where blocks begin, u = -1, rounded once; derivatives in double precision
+        """Values of three states where blocks are entered, rounded once; derivatives in double precision
         are sums of rounded products, since mpf take longer than all steps of a run.
         """
         rows, shape = blocks.reshape(-1, series.terms), blocks.shape[:2]

@@ -36,7 +36,7 @@ import numpy as np
 
 from rigidsim.model.orbits.kepler_motion import KeplerParts
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.scaling import Rounder
+from rigidsim.model.scaling import Rounder, Scaling
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.arithmetic import bits_in_use, cosine_and_sine
@@ -267,41 +267,42 @@ class TablePieces:
     """Pieces of one table, which begin at its rows (see ``rigidsim.model.orbits.pieces.PieceSeries``)."""
 
     def __init__(
-        self, orbit: TabulatedOrbit, place: TablePlace, time_exponent: int, start: Any, number: Rounder
+        self, orbit: TabulatedOrbit, place: TablePlace, scaling: Scaling, start: Any, number: Rounder
     ) -> None:
-        self._orbit, self._place, self._exponent = orbit, place, time_exponent
-        self._start, self._number = start, number
+        self._orbit, self._place, self._exponent = orbit, place, scaling.time
+        self._start, self._number, self._back = start, number, int(scaling.direction < 0)
         self.knots: list[Any] = []
-        self._rows = [orbit.number_at(start)]
-        for row, time in enumerate(orbit.table.times[1:-1], start=1):
-            if time > start:
-                knot = number(orbit.context.ldexp(time, -time_exponent))
+        self._pieces = [orbit.number_at(start)]
+        inner = list(enumerate(orbit.table.times))[1:-1]
+        for row, time in reversed(inner) if self._back else inner:
+            if time <= start if self._back else time > start:
+                knot = number(scaling.internal(time, orbit.context))
                 if self.knots and knot == self.knots[-1]:  # rows that the precision can't tell apart
-                    self._rows[-1] = row
+                    self._pieces[-1] = row - self._back
                 else:
                     self.knots.append(knot)
-                    self._rows.append(row)
+                    self._pieces.append(row - self._back)
 
     @cached_property
     def states(self) -> list[str]:
         """See ``PieceSeries``."""
-        return list(self._begin(self._rows[0]))
+        return list(self._begin(self._pieces[0]))
 
     def numbers(self, first: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
         """See ``PieceSeries``."""
-        rows, context = self._rows[first:stop], self._orbit.context
+        pieces, context = self._pieces[first:stop], self._orbit.context
         least = context.ldexp(1, _LEAST * bits_in_use(context))
-        parameters = [[self._number(x if abs(x) > least else 0 * x) for x in self._of(row)] for row in rows]
-        states = [[self._number(x) for x in self._begin(row).values()] for row in rows]
+        parameters = [[self._number(x if abs(x) > least else 0 * x) for x in self._of(one)] for one in pieces]
+        states = [[self._number(x) for x in self._begin(one).values()] for one in pieces]
         kind = type(parameters[0][0])
         return np.array(parameters, dtype=kind), np.array(states, dtype=kind)
 
-    def _begin(self, row: int) -> dict[str, Any]:
-        """Values of states at a row, by name."""
+    def _begin(self, piece: int) -> dict[str, Any]:
+        """Values of states by name at the row where a piece is entered: its end in a run that goes back."""
         found: dict[str, Any] = {}
         orbit, place = self._orbit, self._place
-        begin, tag, elements = orbit.row(row), place.tag, place.elements(orbit)
-        found[_name("part", tag)] = orbit.context.zero
+        begin, tag, elements = orbit.row(piece + self._back), place.tag, place.elements(orbit)
+        found[_name("part", tag)] = orbit.context.mpf(self._back)
         for element in elements:
             if element != LONGITUDE:
                 found[_name(element, tag)] = begin[element] / _unit(orbit, element)

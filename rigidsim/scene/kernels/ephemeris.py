@@ -75,7 +75,7 @@ class Ephemeris:
         except KernelError as error:
             raise self.refused(str(error)) from None
         first, last = found.span
-        begin, end = self.run
+        begin, end = sorted(self.run)
         ahead = exactly(begin.context, self.ahead)
         if begin + ahead < exactly(begin.context, first) or end + ahead > exactly(begin.context, last):
             asked = " to ".join(date_of(int(x + ahead)) for x in self.run)

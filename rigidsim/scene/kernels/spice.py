@@ -160,7 +160,7 @@ def resolve_orientation(
         allowed = ", ".join(f'"{name}"' for name in (*CELESTIAL, ECLIPTIC))
         raise ConfigError(Problem("[frame] axes", f"{told}{more}; allowed: {allowed}"))
     ahead = epoch.since_j2000()
-    begin, end = (float(ahead + Fraction(float(time))) for time in run)
+    begin, end = sorted(float(ahead + Fraction(float(time))) for time in run)
     try:
         if not is_path(given):
             raise KernelError(f"which is no path; the path of {_KIND}, with a slash or a suffix, is allowed")

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -134,7 +134,8 @@ class BatchRun:
         start, columns = np.empty(len(units)), np.empty((self._traced.prepared.clock.count, len(units)))
         for unit in np.unique(units).tolist():
             if unit not in self._clocks:
-                self._clocks[unit] = SampleClock(self._system.scene.samples, self._precision, unit)
+                scaling = replace(self._system.scaling, time=unit)
+                self._clocks[unit] = SampleClock(self._system.scene.samples, self._precision, scaling)
             clock, same = self._clocks[unit], units == unit
             start[same] = clock.start
             columns[:, same] = clock.internal(0, clock.count)[:, None]
@@ -176,23 +177,23 @@ class BatchRun:
                 states = np.array([f.state for _, f in rows]).T[None]
                 at = self._outputs.at(states, swept[:, place], times[None], begun[:, place])
                 values = self._outputs.named_at_events(at, numbers, part[place])
-            seconds = np.ldexp(times, units[place]) if rows else times
+            seconds = self._system.scaling.direction * np.ldexp(times, units[place]) if rows else times
             events.append(BatchEvents(crossing.name, place, seconds, values))
         return events
 
     def _ended_by_events(self, block: BatchBlock) -> None:
         """End motions at the first crossing that stops them; later samples and crossings are dropped."""
         stops = [e for e, c in zip(block.events, self._system.crossings, strict=True) if c.stop]
-        first = np.full(len(block.members), math.inf)
+        first, way = np.full(len(block.members), math.inf), self._system.scaling.direction
         for event in stops:
-            np.minimum.at(first, event.member, event.time)
+            np.minimum.at(first, event.member, way * event.time)
         for m in np.flatnonzero(np.isfinite(first)).tolist():
-            samples = int(np.searchsorted(block.times, first[m], side="right"))
+            samples = int(np.searchsorted(way * block.times, first[m], side="right"))
             if samples <= block.reached[m]:
                 block.status[m] = Status.EVENT
                 _end(block, m, samples)
         for n, event in enumerate(block.events):
-            kept = event.time <= first[event.member]
+            kept = way * event.time <= first[event.member]
             if not kept.all():
                 values = {name: v[kept] for name, v in event.values.items()}
                 block.events[n] = BatchEvents(event.name, event.member[kept], event.time[kept], values)

@@ -112,7 +112,8 @@ class ClosedForm:
         """
         if precision.narrow:
             # the difference of two doubles is a pair, exactly
-            elapsed = two_sum(np.asarray(times, dtype=np.float64), -float(start))
+            way = float(self.scaling.direction)
+            elapsed = two_sum(way * np.asarray(times, dtype=np.float64), -way * float(start))
             columns = self._columns(Doubles(), elapsed, system)
             return np.stack(columns, axis=1).astype(precision.scalar)
         begin = precision.exact(start)
@@ -125,7 +126,7 @@ class ClosedForm:
             if late not in known:
                 known[late] = Digits(self._context(precision.bits, late))
             arithmetic = known[late]
-            elapsed = arithmetic.number(exact) - arithmetic.number(begin)
+            elapsed = self.scaling.direction * (arithmetic.number(exact) - arithmetic.number(begin))
             row = self._columns(arithmetic, elapsed, system)
             result[n] = [precision.number(x) for x in row]
         return result

@@ -64,7 +64,7 @@ class ClosedFormSolver(Solver):
         return Status.FINISHED if buffer.complete else None
 
     def settle(self, boundary: StepBoundary, moment: Scalar) -> None:
-        self.progress.time = float(moment) * 2.0**self.clock.exponent
+        self.progress.time = float(moment) * self.clock.unit
 
 
 @solves(METHODS["closed_form"])

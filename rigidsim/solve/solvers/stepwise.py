@@ -48,7 +48,6 @@ class StepwiseSolver(Solver):
     ) -> None:
         super().begin(clock, buffer, progress, start)
         self._last = clock.at(clock.count - 1)
-        self._unit = float(np.ldexp(1.0, clock.exponent))
         if start is not None:
             self.corrected.back_to(start)
         self.stepper.destination = float(self._last)
@@ -134,7 +133,7 @@ class StepwiseSolver(Solver):
 
     def _account(self) -> None:
         self.progress.steps = self.stepper.steps
-        self.progress.time = float(self.stepper.time) * self._unit
+        self.progress.time = float(self.stepper.time) * self.clock.unit
 
     def _dense(self, times: np.ndarray) -> np.ndarray:
         return np.array([self.stepper.dense(t) for t in times])

@@ -40,9 +40,8 @@ class Moments:
         self.of_time = of_time(system, place)
         known = system.clocked and self.of_time
         self.at_known_time = known and as_line(expression, self._context) is not None
-        exponent = -system.scaling.time
         lines = lines_in(expression, self._context) if known and not self.at_known_time else []
-        self._middles = sorted(self._context.ldexp(line.zero, exponent) for line in lines)
+        self._middles = sorted(system.scaling.internal(line.zero, self._context) for line in lines)
         self._from = [precision.number(middle) for middle in self._middles]
         self._zeros: dict[tuple[int, ...], tuple[Expression, Any]] = {}
 
@@ -111,7 +110,8 @@ class Moments:
         return _zero(function, about, rounding, self._middles, modes[self._place], context)
 
     def _value(self, expression: Expression, time: Any) -> Any:
-        unit = self._context.ldexp(self._context.one, self._system.scaling.time)
+        scaling = self._system.scaling
+        unit = self._context.ldexp(scaling.direction * self._context.one, scaling.time)
         return evaluate(expression, {"t": time * unit}, self._context)
 
     def _on(self, modes: Sequence[int]) -> tuple[Expression, Any]:
@@ -120,7 +120,7 @@ class Moments:
         if sides not in self._zeros:
             found = on_sides(self._expression, self._system.plan.surfaces.places, sides)
             line = as_line(found, self._context) if self._system.clocked else None
-            zero = None if line is None else self._context.ldexp(line.zero, -self._system.scaling.time)
+            zero = None if line is None else self._system.scaling.internal(line.zero, self._context)
             self._zeros[sides] = found, zero
         return self._zeros[sides]
 

@@ -207,9 +207,8 @@ class TurnCounter:
         bound = angle_rate(system, self._angles)
         self._source = math.ldexp(bound - float(system.rate_bound), system.scaling.time)
         rate = math.sqrt(3) * bound
-        span = system.scene.samples
-        radians = rate * float(span.exact_last - span.begin)
-        start = math.ldexp(float(span.begin), -system.scaling.time)
+        radians = rate * float(system.scene.duration)
+        start = float(system.start)
         if system.stepwise:
             self._states = _by_steps(stepper_of(system, double, _TOLERANCE, start))
         else:

@@ -29,7 +29,7 @@ from rigidsim.workflows.compare.result import (
     thinned,
 )
 from rigidsim.workflows.compare.verdict import judged, rms, unexplained_share
-from rigidsim.workflows.read import Given, as_experiment
+from rigidsim.workflows.read import Given, as_experiment, refuse_backwards
 from rigidsim.workflows.run import run
 
 WITHIN = 1e-9
@@ -146,7 +146,9 @@ def _plain(experiment: Experiment) -> tuple[Experiment, Scene]:
     flies = config.initial.position is not None or config.initial.velocity is not None
     names = ["quaternion", "angular_velocity", *(["position"] if flies else [])]
     quiet = experiment.quiet(names, estimate=config.output.estimate)
-    return quiet, build_scene(quiet)
+    scene = build_scene(quiet)
+    refuse_backwards(scene, experiment.source)
+    return quiet, scene
 
 
 def _sampled(experiment: Experiment, times: np.ndarray) -> Run:

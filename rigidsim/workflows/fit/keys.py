@@ -19,6 +19,7 @@ from rigidsim.scene.toml_text import apply_overrides, parse_toml
 from rigidsim.scene.units import powers, unit_text
 from rigidsim.scene.validation_messages import shown
 from rigidsim.scene.varied_keys import ATTITUDE, VariedKey, varied_keys
+from rigidsim.workflows.read import refuse_backwards
 
 _FORMS = ("euler_angles", "pole", "prime_meridian", "obliquity", "node_longitude")
 
@@ -59,6 +60,7 @@ class FitKeys:
         self._experiment = experiment
         self._tables = parse_toml(experiment.text, experiment.source)
         self._scene = build_scene(experiment)
+        refuse_backwards(self._scene, experiment.source)
         self._problems: list[Problem] = []
         self.estimated = self._all("parameters", table.parameters, table.prior)
         self.considered = self._all("consider", list(table.consider), table.consider)

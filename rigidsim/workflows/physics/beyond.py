@@ -54,7 +54,7 @@ def geodetic(scene: Scene) -> UnassessedEffect | None:
             rates.append(1.5 * strength**1.5 / (_LIGHT**2 * distance**2.5))
     if not rates:
         return None
-    size = max(rates) * float(scene.samples.last - scene.start) * ARCSEC
+    size = max(rates) * abs(float(scene.samples.last - scene.start)) * ARCSEC
     why = f"the equations have none; a free axis would turn by some {size:.2g} arcsec over the span, one "
     return UnassessedEffect(what="geodetic precession", why=why + "locked to its orbit by none")
 

@@ -107,7 +107,7 @@ def required_physics(
         name=config.name,
         error_arcsec=most * ARCSEC,
         compared=models.compared,
-        span_s=float(prepared.scene.samples.last - prepared.scene.start),
+        span_s=abs(float(prepared.scene.samples.last - prepared.scene.start)),
         samples=len(full.rotations),
         full=_compared(full, [], 0.0, most),
         least=least,

@@ -1,0 +1,170 @@
+"""There and back again: a motion to its last sample, and from the state there back to its start.
+
+By how much the way back misses the start is what both ways have made of rounding and of the tolerance, a
+measure that needs no other solution. It says nothing of the model, nor of errors that both ways share.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rigidsim.accuracy.comparison import angles_between, distances_between
+from rigidsim.accuracy.estimates.estimate import estimate_errors
+from rigidsim.accuracy.trial import Collected
+from rigidsim.errors import ConfigError, Problem, RigidsimError
+from rigidsim.model.load import Load
+from rigidsim.model.system import System
+from rigidsim.scene.choices import variables_named
+from rigidsim.scene.config import Experiment
+from rigidsim.scene.sample_times import SampleTimes
+from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.solve.problem import InitialValueProblem, prepare_scene
+from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.sampling import SampleClock
+from rigidsim.solve.status import Status
+
+_BEYOND = 10.0  # times the announced error: no run is further off without a warning
+_SMALL = {
+    "quaternion": "attitude",
+    "momentum_axis": "attitude",
+    "angular_velocity": "rates",
+    "position": "position",
+}
+
+
+@dataclass(frozen=True)
+class Reversal:
+    """How close a motion comes back to its start.
+
+    Attributes:
+        attitude: angle, rad; of an averaged motion, of the angular momentum's direction; None without either.
+        rates: difference of angular velocities relative to their size; None where none are carried.
+        position: distance, m; None for a body that doesn't fly.
+        announced: sum of both ways' estimated errors of the attitude, or of the rates without one, rad or
+            relative; None if they can't be estimated.
+        steps: of both ways.
+    """
+
+    attitude: float | None
+    rates: float | None
+    position: float | None
+    announced: float | None
+    steps: int
+
+    @property
+    def beyond(self) -> bool:
+        """Whether the difference is more than ten times what both ways announce."""
+        found = self.rates if self.attitude is None else self.attitude
+        return self.announced is not None and not (found or 0.0) <= _BEYOND * self.announced
+
+    @property
+    def words(self) -> str:
+        """The difference in words."""
+        parts = []
+        if self.attitude is not None:
+            parts.append(f"attitude within {self.attitude:.2g} rad")
+        if self.rates is not None:
+            parts.append(f"angular velocity within {self.rates:.2g} of its size")
+        if self.position is not None:
+            parts.append(f"position within {self.position:.2g} m")
+        unit = "" if self.attitude is None else " rad"
+        told = "" if self.announced is None else f"; both ways announce {self.announced:.2g}{unit}"
+        return f"integrated to the end and back, it returns to its start: {', '.join(parts)}{told}"
+
+
+class _Ends(Collected):
+    """Start and end of a motion, with the state there."""
+
+    def take(self, block: SampleBlock) -> None:
+        """See ``SampleReceiver``."""
+        super().take(block)
+        self.state = block.states[-1]
+
+
+def there_and_back(experiment: Experiment, loads: Sequence[Load] = ()) -> Reversal:
+    """Integrate an experiment's motion to its last sample and back.
+
+    Raises:
+        ConfigError: it can't be integrated.
+        RigidsimError: it ends before its last sample, or on the way back.
+    """
+    config = experiment.config
+    regular = variables_named(config.integrator.formulation).regular
+    if not regular:  # whose charts change on the way
+        integrator = config.integrator.model_copy(update={"formulation": "quaternion"})
+        config = config.model_copy(update={"integrator": integrator})
+    names = [name for name in _SMALL if _records(replace(experiment, config=config), name, loads)]
+    if "quaternion" in names and "momentum_axis" in names:
+        names.remove("momentum_axis")
+    if not names:
+        raise ConfigError(Problem("[integrator]", "the motion has neither an attitude nor rates to compare"))
+    quiet = replace(experiment, config=config).quiet(names)
+    scene = build_scene(quiet)
+    scene = _between(scene, scene.start, scene.samples.last)
+    there = prepare_scene(quiet, scene, loads=loads)
+    one = _taken(there, names, "the motion")
+    back = _reversed(there, one.state)
+    other = _taken(back, names, "the motion back")
+    found = {_SMALL[name]: _apart(name, one[name], other[name]) for name in names}
+    announced = [_announced(problem, way) for problem, way in ((there, one), (back, other))]
+    return Reversal(
+        attitude=found.get("attitude"),
+        rates=found.get("rates"),
+        position=found.get("position"),
+        announced=None if None in announced else float(sum(x for x in announced if x is not None)),
+        steps=one.progress.steps + other.progress.steps,
+    )
+
+
+def _records(experiment: Experiment, name: str, loads: Sequence[Load]) -> bool:
+    try:
+        quiet = experiment.quiet([name])
+        prepare_scene(quiet, build_scene(quiet), loads=loads)
+    except ConfigError:
+        return False
+    return True
+
+
+def _between(scene: Scene, start: object, end: object) -> Scene:
+    """The scene from one time (mpf, s) to another, sampled at both."""
+    exact = [scene.samples.begin, scene.samples.exact_last]
+    if start != scene.start:
+        exact.reverse()
+    samples = SampleTimes.listed(exact[0], exact, scene.context)
+    return replace(scene, start=start, end=end, samples=samples)
+
+
+def _taken(problem: InitialValueProblem, names: Sequence[str], what: str) -> _Ends:
+    found = _Ends(problem, names)
+    if found.progress.status is not Status.FINISHED:
+        raise RigidsimError(f"{what} {found.progress.status.message}, before its end; nothing was compared")
+    return found
+
+
+def _reversed(there: InitialValueProblem, state: np.ndarray) -> InitialValueProblem:
+    """The problem from a state at the end (scalars of the precision, internal units) back to the start."""
+    system, precision = there.system, there.precision
+    scene = _between(there.scene, there.scene.end, there.scene.start)
+    scaling = replace(system.scaling, direction=-system.scaling.direction)
+    plan = replace(system.plan, scene=scene, scaling=scaling)
+    again = System(plan, system.number, coefficients=system.coefficients).begun_at(
+        [scene.context.mpf(precision.exact(x)) for x in state]
+    )
+    clock = SampleClock(scene.samples, precision, scaling)
+    return replace(there, scene=scene, system=again, clock=clock)
+
+
+def _apart(name: str, there: list[np.ndarray], back: list[np.ndarray]) -> float:
+    """Between the start and where the way back ended, both recorded as float64 parts (2, components)."""
+    one, other = [part[:1] for part in there], [part[-1:] for part in back]
+    if name == "quaternion":
+        return float(angles_between(one, other)[0])
+    apart = float(distances_between(one, other)[0])
+    size = max(float(np.linalg.norm(part[0], axis=1).max()) for part in (there, back))
+    return apart / (size or 1.0) if name == "angular_velocity" else apart
+
+
+def _announced(problem: InitialValueProblem, way: Collected) -> float | None:
+    found = estimate_errors(problem, way.progress.steps, float(problem.scene.samples.last))
+    return None if found is None else found.leading
