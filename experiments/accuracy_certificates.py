@@ -129,7 +129,3 @@ def certificates(full: bool, first: int = 0, count: int = 0, seed: int = 0) -> A
     count = count or (300 if full else 2 * len(KINDS))
     outcomes = campaign(range(first, first + count), seed)
     return checks(outcomes), picture(outcomes)
-
-
-if __name__ == "__main__":
-    raise SystemExit(certificates.main())

@@ -15,11 +15,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from experiments.common import Check, add_arguments, table
+from experiments.common import DEFAULT_OUT, Check, table
 
 STUDIES = (
     "earth_free_nutation",
-    "toutatis",
     "heavy_top_regimes",
     "flip_period",
     "precession_and_nutation",
@@ -70,7 +69,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run them, print the table, return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m experiments.all")
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"default: {', '.join(STUDIES)}")
-    add_arguments(parser)
+    parser.add_argument("--out", type=Path, default=DEFAULT_OUT, help="folder of the figures")
+    parser.add_argument("--full", action="store_true", help="longer runs and more cases")
     arguments = parser.parse_args(argv)
     checks, broken = run_studies(arguments.names or STUDIES, arguments.full, arguments.out)
     print(table(checks, "All studies"))

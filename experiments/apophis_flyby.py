@@ -1,39 +1,29 @@
 """What does the Earth make of Apophis' tumbling when it passes on 13 April 2029?
 
-Method: six degrees of freedom, force and torque of the Earth to second degree, from two days before the
-closest approach to two days after it (at either end the torque is 1/20,000 of its largest). Who the
-asteroid is, nobody knows exactly: members are drawn from the published errors, and since its phases in 2029
-follow from periods that are known to 0.7 %, these are drawn evenly. ``configs/sweeps/apophis_flyby.toml``
-holds the first 16 draws, of which the study takes the scene; ``--config`` prints it.
+Six degrees of freedom, force and torque of the Earth to second degree, from two days before the closest
+approach to two days after it (at either end the torque is 1/20,000 of its largest). Members are drawn from
+the published errors; their phases in 2029 follow from periods that are known to 0.7 %, and are drawn evenly.
+``configs/sweeps/apophis_flyby.toml`` holds the first 16 draws and the scene; ``--config`` prints it.
 
-| drawn | from | source |
-| --- | --- | --- |
-| I1/I3, I2/I3 | 0.61 (+0.11, -0.08), 0.965 (+0.009, -0.015) | Pravec et al. 2014, Icarus 233, 48; 3 sigma |
-| P_psi, P_1 | 263 +- 6 h, 30.56 +- 0.01 h, 1 / P_1 = 1 / P_phi - 1 / P_psi | the same |
-| pole | 250, -75 deg (ecliptic), ellipse of 27 by 14 deg, here a circle as large | the same |
-| phases of rotation and precession | even | |
-| orbit | fixed: geocentric elements at perigee, ecliptic J2000 | JPL Horizons |
+Drawn (Pravec et al. 2014, Icarus 233, 48; 3 sigma): I1/I3 = 0.61 (+0.11, -0.08), I2/I3 = 0.965 (+0.009,
+-0.015); P_psi = 263 +- 6 h and P_1 = 30.56 +- 0.01 h, with 1 / P_1 = 1 / P_phi - 1 / P_psi; the pole at 250,
+-75 deg (ecliptic), with a circle as large as the ellipse of 27 by 14 deg. The orbit is fixed (JPL Horizons,
+elements at perigee). Members whose ratios and periods exclude each other are drawn anew.
 
-Members whose ratios and periods exclude each other are drawn anew.
-
-Held against:
-- E/E0 = 1.024 +- 0.013 (Pravec et al. 2014), which follows from the other numbers drawn: the largest
-  difference of the median allowed is their three sigma.
-- Benson et al. 2023 (Icarus 390, 115324), abstract, from the same data and newer ones: Apophis likely stays
-  in short-axis mode; its effective spin rate (2E/L) could halve or double; its pole likely shifts by 10
-  degrees or more, increases in longitude and moves towards the ecliptic. *Likely* is taken as more than
-  half of the members (of those that shift so far, for the ecliptic), *could* as one in 1000. Scheeres et
-  al. 2005 (Icarus 178, 281) foretold as much for any start.
-- Energy and total angular momentum, orbit included, to the round-off law.
+Benson et al. 2023 (Icarus 390, 115324), abstract: Apophis likely stays in short-axis mode; its effective spin
+rate (2E/L) could halve or double; its pole likely shifts by 10 degrees or more, increases in longitude and
+moves towards the ecliptic. *Likely* is taken as more than half of the members (of those that shift so far,
+for the ecliptic), *could* as one in 1000. Scheeres et al. 2005 (Icarus 178, 281) foretold as much for any
+start.
 """
 
 import re
-import sys
 import tempfile
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import xarray
 
 import rigidsim
 from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Study
@@ -174,7 +164,19 @@ def axes_of(drawn: Draws) -> dict[str, str]:
     return {key: f'{{values = {vectors(rows)}, name = "{name}"}}' for key, (name, rows) in listed.items()}
 
 
-def config() -> str:
+def flown(drawn: Draws) -> tuple[xarray.Dataset, np.ndarray, np.ndarray]:
+    """Members after the pass: the sweep's dataset, rates, and directions of the momentum."""
+    settings = [f'sweep.axes."{key}"={text}' for key, text in axes_of(drawn).items()]
+    with tempfile.TemporaryDirectory() as folder:
+        saved = rigidsim.sweep(rigidsim.load(CONFIG, overrides=settings), out=folder)
+        with saved.dataset as opened:
+            found = opened.load()
+    rates = found.angular_velocity_final.values
+    momentum = np.einsum("nij,nj->ni", matrices(found.quaternion_final.values), drawn.moments * rates)
+    return found, rates, momentum / np.linalg.norm(momentum, axis=1)[:, None]
+
+
+def config_text() -> str:
     """The text of ``configs/sweeps/apophis_flyby.toml``, its orbit and its draws made anew."""
     text, mark, _ = CONFIG.read_text(encoding="utf-8").partition("# drawn:\n")
     for key, vector in zip(("position", "velocity"), hyperbola(-DAYS * 86400), strict=True):
@@ -184,64 +186,10 @@ def config() -> str:
     return text + mark + "".join(axes).replace("], [", "],\n    [")
 
 
-@Study
-def study(full: bool) -> Answer:
-    """Many members through the pass, the figure, the checks."""
-    members = 8192 if full else 512
-    drawn = draws(members)
-    settings = [f'sweep.axes."{key}"={text}' for key, text in axes_of(drawn).items()]
-    with tempfile.TemporaryDirectory() as folder:
-        saved = rigidsim.sweep(rigidsim.load(CONFIG, overrides=settings), out=folder)
-        with saved.dataset as opened:
-            found = opened.load()
-        engines = saved.summary["engines"]
-    rates = found.angular_velocity_final.values
-    after = tumbling_of(drawn.moments, rates)
-    momentum = np.einsum("nij,nj->ni", matrices(found.quaternion_final.values), drawn.moments * rates)
-    poles = momentum / after.momentum[:, None]
-    shift = np.degrees(np.arccos(np.clip((poles * drawn.poles).sum(axis=1), -1, 1)))
-    ratio = after.effective / drawn.state.effective
-    eastwards = np.sin(_longitude(poles) - _longitude(drawn.poles)) > 0
-    upwards = np.abs(poles[:, 2]) < np.abs(drawn.poles[:, 2])
-    end, _ = hyperbola(DAYS * 86400)
-    astray = float(np.linalg.norm(found.position_final.values - end, axis=1).max() / np.linalg.norm(end))
-    drifts = [
-        float(np.nanmax(found[n].values / found.drift_bound.values))
-        for n in found
-        if str(n).endswith("_drift_largest")
-    ]
-    excited = float(np.median(drawn.state.excitation))
-    shares = {
-        "stays in short-axis mode": after.short,
-        "shifts its pole by 10 degrees": shift > 10,
-        "increases its pole's longitude": eastwards,
-    }
-    slowest, fastest = (float(x) for x in np.quantile(ratio, [0.001, 0.999]))
-    quantiles = {name: np.quantile(values, [0.05, 0.5, 0.95]) for name, values in (
-        ("pole shifted by, deg", shift), ("effective rate over that before", ratio),
-        ("momentum over that before", after.momentum / drawn.state.momentum),
-        ("E/E0 after", after.excitation[after.short]))}  # fmt: skip
-    print(f"{members} members of {drawn.tried} drawn ({engines})")
-    print(f"  in short-axis mode after the pass: {after.short.mean():.3f}")
-    for name, (low, middle, high) in quantiles.items():
-        print(f"  {name}: median {middle:.3g}, 5 to 95 % {low:.3g} to {high:.3g}")
-    figure = picture(drawn, after, poles, shift)
-    likely = "Benson et al. 2023, abstract; likely: more than half"
-    could = "Benson et al. 2023, abstract, to the one digit it has; one in 1000 beyond"
-    published, error = PUBLISHED_EXCITATION
-    return [
-        Check("E/E0 before, from ratios and periods", excited, published, error, "1",
-              "Pravec et al. 2014, three sigma", "absolute"),
-        *(Check(f"share that {what}", float(those.mean()), 1, 0.5, "1", likely, "absolute")
-          for what, those in shares.items()),
-        Check("of these, share that moves it to the ecliptic", float(upwards[shift > 10].mean()), 1, 0.5, "1",
-              likely, "absolute"),
-        Check("effective rate may halve: over that before", slowest, 0.5, 0.05, "1", could, "absolute"),
-        Check("effective rate may double: over that before", fastest, 2, 0.5, "1", could, "absolute"),
-        Check("place two days after, off Kepler's hyperbola", astray, 0, 1e-9, "1",
-              "closed form; the body's size makes (170 m / 38,000 km)^2 = 2e-11", "absolute"),
-        Check("largest drift over its bound", max(drifts), 0, 1, "1", "round-off law", "absolute"),
-    ], figure  # fmt: skip
+def angle(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Between directions, deg."""
+    across = np.linalg.norm(np.cross(one, other), axis=1)
+    return np.asarray(np.degrees(np.arctan2(across, (one * other).sum(axis=1))))
 
 
 def _longitude(poles: np.ndarray) -> np.ndarray:
@@ -280,7 +228,54 @@ def picture(drawn: Draws, after: Tumbling, poles: np.ndarray, shift: np.ndarray)
     ], (14, 5.2), {"per_subplot_kw": {"a": {"projection": "polar"}}})  # fmt: skip
 
 
-if __name__ == "__main__":
-    if "--config" not in sys.argv:
-        raise SystemExit(study.main())
-    print(config(), end="")
+@Study
+def study(full: bool, config: bool = False) -> Answer:
+    """Many members through the pass, the figure, the checks; or the text of the config alone."""
+    if config:
+        print(config_text(), end="")
+        return [], None
+    members = 8192 if full else 512
+    drawn = draws(members)
+    found, rates, poles = flown(drawn)
+    after, shift = tumbling_of(drawn.moments, rates), angle(poles, drawn.poles)
+    ratio = after.effective / drawn.state.effective
+    eastwards = np.sin(_longitude(poles) - _longitude(drawn.poles)) > 0
+    upwards = np.abs(poles[:, 2]) < np.abs(drawn.poles[:, 2])
+    end, _ = hyperbola(DAYS * 86400)
+    astray = float(np.linalg.norm(found.position_final.values - end, axis=1).max() / np.linalg.norm(end))
+    drifts = [
+        float(np.nanmax(found[n].values / found.drift_bound.values))
+        for n in found
+        if str(n).endswith("_drift_largest")
+    ]
+    excited = float(np.median(drawn.state.excitation))
+    shares = {
+        "stays in short-axis mode": after.short,
+        "shifts its pole by 10 degrees": shift > 10,
+        "increases its pole's longitude": eastwards,
+    }
+    slowest, fastest = (float(x) for x in np.quantile(ratio, [0.001, 0.999]))
+    quantiles = {name: np.quantile(values, [0.05, 0.5, 0.95]) for name, values in (
+        ("pole shifted by, deg", shift), ("effective rate over that before", ratio),
+        ("momentum over that before", after.momentum / drawn.state.momentum),
+        ("E/E0 after", after.excitation[after.short]))}  # fmt: skip
+    print(f"{members} members of {drawn.tried} drawn")
+    print(f"  in short-axis mode after the pass: {after.short.mean():.3f}")
+    for name, (low, middle, high) in quantiles.items():
+        print(f"  {name}: median {middle:.3g}, 5 to 95 % {low:.3g} to {high:.3g}")
+    likely = "Benson et al. 2023, abstract; likely: more than half"
+    could = "Benson et al. 2023, abstract, to the one digit it has; one in 1000 beyond"
+    published, error = PUBLISHED_EXCITATION
+    return [
+        Check("E/E0 before, from ratios and periods", excited, published, error, "1",
+              "Pravec et al. 2014, three sigma", "absolute"),
+        *(Check(f"share that {what}", float(those.mean()), 1, 0.5, "1", likely, "absolute")
+          for what, those in shares.items()),
+        Check("of these, share that moves it to the ecliptic", float(upwards[shift > 10].mean()), 1, 0.5, "1",
+              likely, "absolute"),
+        Check("effective rate may halve: over that before", slowest, 0.5, 0.05, "1", could, "absolute"),
+        Check("effective rate may double: over that before", fastest, 2, 0.5, "1", could, "absolute"),
+        Check("place two days after, off Kepler's hyperbola", astray, 0, 1e-9, "1",
+              "closed form; the body's size makes (170 m / 38,000 km)^2 = 2e-11", "absolute"),
+        Check("largest drift over its bound", max(drifts), 0, 1, "1", "round-off law", "absolute"),
+    ], picture(drawn, after, poles, shift)  # fmt: skip

@@ -1,25 +1,16 @@
 """What is the real sky worth to Apophis' rotation when it passes the Earth in 2029?
 
-Method: the ready scene `apophis_2029`: six degrees of freedom under the Earth, the Moon, the Sun and the
-planets of JPL's DE421, from two days before perigee to two days after it. Its orbit is that of
-`apophis_flyby` at perigee (JPL Horizons), carried back by another integrator. The first draws of that study,
-of whom Apophis might be, fly it, and once more Kepler's hyperbola about the Earth alone.
-
-Held against:
-- the distance at perigee, 0.00025409077 au, and its time, 21:46 TDB to the minute (JPL Horizons);
-- another Horizons vector, of JD 2462239.5, relative to the barycentre of the solar system as DE441 has it,
-  from which DE421's is some 100 km away, since outer planets were weighed better;
-- Benson et al. 2023 (Icarus 390, 115324), abstract: likely stays in short-axis mode; pole likely shifted by
-  10 degrees or more. Likely is more than half;
-- the hyperbola: nothing that the Moon and the Sun do in four days should matter beside what isn't known of
-  the rotation: a tenth of a degree, and a part in a thousand of the rate, for the median member.
+The ready scene `apophis_2029`: six degrees of freedom under the Earth, the Moon, the Sun and the planets of
+JPL's DE421, from two days before perigee to two days after it. Its orbit is that of `apophis_flyby` at
+perigee (JPL Horizons), carried back by another integrator. The first draws of that study fly it, and once
+more Kepler's hyperbola about the Earth alone. Horizons' places are relative to the barycentre of DE441, some
+100 km from DE421's. Nothing that the Moon and the Sun do in four days should matter next to what isn't known
+of the rotation: a tenth of a degree, and a part in a thousand of the rate, for the median member.
 """
 
-import tempfile
-
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-import rigidsim
 from experiments import apophis_flyby as flyby
 from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Result, Study, simulate
 from experiments.measure import matrices
@@ -51,7 +42,7 @@ def flights(drawn: flyby.Draws) -> tuple[np.ndarray, np.ndarray]:
             "body.mass=5e10",
             f"body.principal_moments={(moments * flyby.LARGEST_MOMENT).tolist()!r}",
             f"initial.angular_velocity={spin.tolist()!r}",
-            f"initial.quaternion={quaternion_of(attitude)!r}",
+            f"initial.quaternion={Rotation.from_matrix(attitude).as_quat()[[3, 0, 1, 2]].tolist()!r}",
             "time.every='4 day'",
             "output.record=['angular_velocity', 'momentum_axis']",
             "output.estimate=false",
@@ -62,30 +53,30 @@ def flights(drawn: flyby.Draws) -> tuple[np.ndarray, np.ndarray]:
     return np.array(rates), np.array(poles)
 
 
-def quaternion_of(matrix: np.ndarray) -> list[float]:
-    """Of a rotation matrix, whatever its angle: the eigenvector of the largest eigenvalue."""
-    m = matrix
-    table = np.array(
-        [
-            [m[0, 0] + m[1, 1] + m[2, 2], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
-            [0, m[0, 0] - m[1, 1] - m[2, 2], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0]],
-            [0, 0, m[1, 1] - m[0, 0] - m[2, 2], m[1, 2] + m[2, 1]],
-            [0, 0, 0, m[2, 2] - m[0, 0] - m[1, 1]],
-        ]
-    )
-    return [float(x) for x in np.linalg.eigh(table + np.triu(table, 1).T)[1][:, -1]]
-
-
-def hyperbolas(drawn: flyby.Draws) -> tuple[np.ndarray, np.ndarray]:
-    """The same about the Earth alone."""
-    settings = [f'sweep.axes."{key}"={text}' for key, text in flyby.axes_of(drawn).items()]
-    with tempfile.TemporaryDirectory() as folder:
-        saved = rigidsim.sweep(rigidsim.load(flyby.CONFIG, overrides=settings), out=folder)
-        with saved.dataset as opened:
-            found = opened.load()
-    rates = found.angular_velocity_final.values
-    momentum = np.einsum("nij,nj->ni", matrices(found.quaternion_final.values), drawn.moments * rates)
-    return rates, momentum / np.linalg.norm(momentum, axis=1)[:, None]
+def picture(
+    scene: Result, drawn: flyby.Draws, after: Tumbling, shift: np.ndarray, apart: np.ndarray
+) -> Picture:
+    """The pass and the momentum, and members on both orbits."""
+    hours = scene.values("time") / 3600 - 48
+    momentum = scene.values("angular_momentum")
+    size = np.linalg.norm(momentum, axis=1)
+    poles = momentum / size[:, None]
+    ratio = after.effective / drawn.state.effective
+    title = "Apophis past the Earth: a new rotation, to which Moon and Sun hardly matter"
+    return Picture(title, "abc", [
+        Panel("Distance from the Earth (dashed: the Moon's)", "hours from perigee", "1000 km", [
+            Curve(hours, np.linalg.norm(scene.values("position"), axis=1) / 1e6),
+            Curve(None, 384.4, "", "grey", "--", 0.8),
+        ], "y"),
+        Panel("Angular momentum of the ready scene", "hours from perigee", "change", [
+            Curve(hours, flyby.angle(poles, np.broadcast_to(poles[0], poles.shape)), "pole, deg"),
+            Curve(hours, 100 * (size / size[0] - 1), "size, %", "orange"),
+        ], limits={"xlim": (-12, 12)}, legend="center right"),
+        Panel("Members: worth of Moon, Sun and planets (blue)", "pole shifted by, deg", "", [
+            Curve(shift, apart, "pole, deg", "blue", "o"),
+            Curve(shift, 100 * np.abs(ratio - 1), "change of the rate, %", "orange", "o"),
+        ], "y", legend="center right"),
+    ], (14, 4.8))  # fmt: skip
 
 
 @Study
@@ -97,10 +88,9 @@ def study(full: bool) -> Answer:
     nearest = int(distance.argmin())
     begin, vector = orbit(-2.0), orbit(VECTOR_DATE - apophis.PERIGEE)[:3]
     rates, poles = flights(drawn)
-    other_rates, other_poles = hyperbolas(drawn)
+    _, other_rates, other_poles = flyby.flown(drawn)
     after, alone = tumbling_of(drawn.moments, rates), tumbling_of(drawn.moments, other_rates)
-    shift, apart = angle(poles, drawn.poles), angle(poles, other_poles)
-    figure = picture(scene, drawn, after, shift, apart)
+    shift, apart = flyby.angle(poles, drawn.poles), flyby.angle(poles, other_poles)
     likely = "Benson et al. 2023, abstract; likely: more than half"
     none = "none; little beside what isn't known of the rotation"
     return [
@@ -120,40 +110,4 @@ def study(full: bool) -> Answer:
               "absolute"),
         Check("effective rate over that about the Earth alone, median",
               float(np.median(after.effective / alone.effective)), 1.0, 1e-3, "1", none, "absolute"),
-    ], figure  # fmt: skip
-
-
-def angle(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Between directions, deg."""
-    return np.asarray(np.degrees(np.arctan2(
-        np.linalg.norm(np.cross(one, other), axis=1), (one * other).sum(axis=1))))  # fmt: skip
-
-
-def picture(
-    scene: Result, drawn: flyby.Draws, after: Tumbling, shift: np.ndarray, apart: np.ndarray
-) -> Picture:
-    """The pass and the momentum, and members on both orbits."""
-    hours = scene.values("time") / 3600 - 48
-    momentum = scene.values("angular_momentum")
-    size = np.linalg.norm(momentum, axis=1)
-    poles = momentum / size[:, None]
-    ratio = after.effective / drawn.state.effective
-    title = "Apophis past the Earth: a new rotation, to which Moon and Sun hardly matter"
-    return Picture(title, "abc", [
-        Panel("Distance from the Earth (dashed: the Moon's)", "hours from perigee", "1000 km", [
-            Curve(hours, np.linalg.norm(scene.values("position"), axis=1) / 1e6),
-            Curve(None, 384.4, "", "grey", "--", 0.8),
-        ], "y"),
-        Panel("Angular momentum of the ready scene", "hours from perigee", "change", [
-            Curve(hours, angle(poles, np.broadcast_to(poles[0], poles.shape)), "pole, deg"),
-            Curve(hours, 100 * (size / size[0] - 1), "size, %", "orange"),
-        ], limits={"xlim": (-12, 12)}, legend="center right"),
-        Panel("Members: worth of Moon, Sun and planets (blue)", "pole shifted by, deg", "", [
-            Curve(shift, apart, "pole, deg", "blue", "o"),
-            Curve(shift, 100 * np.abs(ratio - 1), "change of the rate, %", "orange", "o"),
-        ], "y", legend="center right"),
-    ], (14, 4.8))  # fmt: skip
-
-
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+    ], picture(scene, drawn, after, shift, apart)  # fmt: skip

@@ -184,23 +184,6 @@ def sound(axes: list[Axis]) -> bool:
     return bool((ratios <= TIMES).mean() >= PART and (silent <= MOST).all() and np.isfinite(ratios).all())
 
 
-@Study
-def study(full: bool, seed: int = 16) -> Answer:
-    """Rotating and librating bodies."""
-    rotating_ones = [axes[0] for _, axes in members(40 if full else 12, seed, rotating)]
-    resting = [axis for _, axes in members(56 if full else 4, 7) for axis in axes]
-    # both integrations round as well, by no more than 1e-9 rad here
-    ratios = np.array([one.announced / max(one.true - 1e-9, 1e-12) for one in rotating_ones])
-    return [
-        Check("true error over the announced one, largest", float((1 / ratios).max()), 0.0, 1.0, "1",
-              "the summary's own bound", "absolute"),
-        Check("announced error over the true one, median", float(np.median(ratios)), 0.0, 10.0, "1",
-              "ten times in half of the runs", "absolute"),
-        Check("librating bodies: errors beyond what is allowed", float(not sound(resting)), 0.0, 0.0, "1",
-              "3 times the announced one in 99 %, 10 times in all without a warning", "absolute"),
-    ], picture(rotating_ones, resting)  # fmt: skip
-
-
 def picture(turning: list[Axis], resting: list[Axis]) -> Picture:
     """Announced errors against true ones."""
     ran = [*turning, *resting]
@@ -216,5 +199,18 @@ def picture(turning: list[Axis], resting: list[Axis]) -> Picture:
     return Picture(title, "a", [panel], (8.4, 6.2))
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool, seed: int = 16) -> Answer:
+    """Rotating and librating bodies."""
+    rotating_ones = [axes[0] for _, axes in members(40 if full else 12, seed, rotating)]
+    resting = [axis for _, axes in members(56 if full else 4, 7) for axis in axes]
+    # both integrations round as well, by no more than 1e-9 rad here
+    ratios = np.array([one.announced / max(one.true - 1e-9, 1e-12) for one in rotating_ones])
+    return [
+        Check("true error over the announced one, largest", float((1 / ratios).max()), 0.0, 1.0, "1",
+              "the summary's own bound", "absolute"),
+        Check("announced error over the true one, median", float(np.median(ratios)), 0.0, 10.0, "1",
+              "ten times in half of the runs", "absolute"),
+        Check("librating bodies: errors beyond what is allowed", float(not sound(resting)), 0.0, 0.0, "1",
+              "3 times the announced one in 99 %, 10 times in all without a warning", "absolute"),
+    ], picture(rotating_ones, resting)  # fmt: skip

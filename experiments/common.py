@@ -1,19 +1,22 @@
 """What all studies share: checks and their table, the command line, runs in a temporary folder, figures.
 
 A study is a module whose text asks a question and whose ``study(full)``, under ``@Study``, returns checks
-and a picture; its command writes ``out/NAME.png`` and ends with exit code 1 if a check fails.
+and a picture; its command writes ``out/NAME.png`` and ends with exit code 1 if a check fails. Campaigns of
+other kinds have a function under ``@Command``.
 """
 
 import argparse
 import inspect
 import math
+import sys
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 import mpmath
+import numpy as np
 import xarray
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -100,14 +103,6 @@ def table(checks: Sequence[Check], title: str = "") -> str:
     )
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """``--out`` and ``--full``."""
-    parser.add_argument(
-        "--out", type=Path, default=DEFAULT_OUT, help="folder of the figure (default: %(default)s)"
-    )
-    parser.add_argument("--full", action="store_true", help="longer runs and more cases")
-
-
 @dataclass(frozen=True)
 class Result:
     """A finished run, in memory."""
@@ -119,6 +114,24 @@ class Result:
     def steps(self) -> int:
         """Taylor steps taken."""
         return int(self.summary["cost"]["steps"])
+
+    @property
+    def seconds(self) -> float:
+        """CPU of integrating and recording."""
+        return float(self.summary["cost"]["cpu_by_phase"]["integrate_and_record"])
+
+    def told(self, name: str) -> "Result":
+        """Print steps and CPU on stderr."""
+        print(f"{name:40s} {self.steps:12,d} steps, {self.seconds:.3g} s", file=sys.stderr)
+        return self
+
+    def apart(self, other: "Result", name: str = "momentum_axis") -> np.ndarray:
+        """Distances of a vector from another run's, at the samples."""
+        return np.asarray(np.linalg.norm(self.values(name) - other.values(name), axis=1))
+
+    def announced(self, name: str = "momentum_axis") -> float:
+        """How far an averaged run says that a variable may be from the full motion's, until the end."""
+        return float(self.summary["modelling"][name])
 
     def values(self, name: str) -> Any:
         """A variable as a float64 array."""
@@ -161,6 +174,16 @@ def simulate(config: str | Path, *overrides: str) -> Result:
             raise RuntimeError(f"{experiment.config.name}: {run.status}: {run.summary['message']}")
         with run.dataset as dataset:
             return Result(dataset.load(), run.summary)
+
+
+def covered(title: str, distance: np.ndarray, announced: float) -> Check:
+    """An average's largest distance from the full motion over what it announces."""
+    print(f"{title}: {distance.max():.2g} from the full motion, {announced:.2g} announced", file=sys.stderr)
+    name, source = (
+        f"{title} from the full motion's, over what is announced",
+        "summary.json, modelling: at most 1",
+    )
+    return Check(name, float(distance.max()) / announced, 0.5, 0.5, "1", source, "absolute")
 
 
 def round_off(result: Result, rate: float, precision: str = "double") -> float:
@@ -301,18 +324,69 @@ Answer = tuple[list[Check], Picture | None]
 """Checks, and the picture if there is one."""
 
 
-class Study:
-    """A study of motions: ``@Study`` over ``study(full) -> Answer`` makes a command of its module.
+class Command:
+    """``@Command`` over the last function of a module makes a command of it, with its arguments as options.
+
+    The function prints what it finds, and returns the exit code: 0 if nothing is wrong. A module that is run
+    by ``python -m`` ends here.
 
     Attributes:
         name: of the module.
         question: the module's text.
     """
 
-    def __init__(self, measure: Callable[..., Answer]) -> None:
+    def __init__(self, measure: Callable[..., Any]) -> None:
         self.measure = measure
         self.name = Path(measure.__code__.co_filename).stem
         self.question = str(measure.__globals__["__doc__"])
+        if measure.__module__ == "__main__":
+            raise SystemExit(self.main())
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Names and defaults, whose types the given values get; a switch is False by default."""
+        return {name: one.default for name, one in inspect.signature(self.measure).parameters.items()}
+
+    def parsed(self, argv: Sequence[str] | None) -> dict[str, Any]:
+        """The function's arguments."""
+        parser = argparse.ArgumentParser(
+            prog=f"python -m experiments.{self.name}",
+            description=self.question,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        for name, default in self.options.items():
+            flag = f"--{name.replace('_', '-')}"
+            if default is False:
+                parser.add_argument(flag, action="store_true")
+            else:
+                parser.add_argument(flag, type=type(default), default=default, help="default: %(default)s")
+        return vars(parser.parse_args(argv))
+
+    def main(self, argv: Sequence[str] | None = None) -> int:
+        """The command."""
+        return int(self.measure(**self.parsed(argv)))
+
+
+def chosen(text: str, known: Iterable[str]) -> list[str]:
+    """Names in an option's text, separated by commas; all that are known if it is empty.
+
+    Raises:
+        SystemExit: one isn't known.
+    """
+    names = text.split(",") if text else list(known)
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise SystemExit(f"given {', '.join(unknown)}; known: {', '.join(known)}")
+    return names
+
+
+class Study(Command):
+    """A study of motions, ``study(full) -> Answer``; ``--full`` is for longer runs and more cases."""
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Those of the function, and ``--out``, the folder of the figure."""
+        return super().options | {"full": False, "out": DEFAULT_OUT}
 
     def __call__(self, full: bool, out: Path, **more: Any) -> list[Check]:
         """Measure, and save the picture as ``out/NAME.png``."""
@@ -322,15 +396,7 @@ class Study:
         return checks
 
     def main(self, argv: Sequence[str] | None = None) -> int:
-        """The command, with the function's further arguments as options; exit code 1 if a check failed."""
-        parser = argparse.ArgumentParser(
-            prog=f"python -m experiments.{self.name}",
-            description=self.question,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-        add_arguments(parser)
-        for option in list(inspect.signature(self.measure).parameters.values())[1:]:
-            parser.add_argument(f"--{option.name}", type=type(option.default), default=option.default)
-        checks = self(**vars(parser.parse_args(argv)))
+        """Print the table; exit code 1 if a check failed."""
+        checks = self(**self.parsed(argv))
         print(table(checks, self.name))
         return int(not checks or not all(check.passed for check in checks))

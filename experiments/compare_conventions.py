@@ -12,17 +12,14 @@ rates is as large as the true one, so that the convention is right or makes no d
 integration is called a wrong model, no wrong model an integration error or agreement.
 
 Run: python -m experiments.compare_conventions [--files N] [--models N] [--seed N] [--no-rates] [--mixed N]
-
-Exit: 1 if one fails
+Exit code 1 if one fails.
 """
 
 from __future__ import annotations
 
-import argparse
 import random
-import sys
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -31,6 +28,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import rigidsim
+from experiments.common import Command
 from rigidsim.workflows.compare.result import Comparison
 
 SEQUENCES = ["zxz", "zyz", "xyx", "xzx", "yxy", "yzy", "zyx", "xyz", "xzy", "yxz", "yzx", "zxy"]
@@ -74,12 +72,9 @@ class Model:
         q, w = y[:4], y[4:]
         torque = -self.load * w if self.kind == "braked" else np.zeros(3)
         if self.kind == "top":  # weight at (0, 0, 1) below a vertical Z: up in body axes times -load
-            x, y_, z = (
-                2 * (q[1] * q[3] - q[0] * q[2]),
-                2 * (q[2] * q[3] + q[0] * q[1]),
-                1 - 2 * (q[1] ** 2 + q[2] ** 2),
-            )
-            torque = -self.load * np.cross([0, 0, 1.0], np.array([x, y_, z]) / (q @ q))
+            across = 2 * (q[1] * q[3] - q[0] * q[2]), 2 * (q[2] * q[3] + q[0] * q[1])
+            up = np.array([*across, 1 - 2 * (q[1] ** 2 + q[2] ** 2)]) / (q @ q)
+            torque = -self.load * np.cross([0, 0, 1.0], up)
         turn = np.array([-q[1:] @ w, *(q[0] * w + np.cross(q[1:], w))]) / 2
         return np.concatenate([turn, (torque - np.cross(w, self.moments * w)) / self.moments])
 
@@ -167,14 +162,23 @@ def judged(model: Model, times: np.ndarray, columns: dict[str, np.ndarray], rate
     return rigidsim.compare(rigidsim.parse(model.config), {"t": times, **kept})
 
 
+def spaced(model: Model, chance: random.Random) -> np.ndarray:
+    """Even rows, near and far apart."""
+    turned = model.end * float(np.linalg.norm(model.rates))
+    return np.linspace(0, model.end, max(8, round(turned / 10 ** chance.uniform(-1.7, 0))))
+
+
+def loose(method: str, chance: random.Random, least: float) -> float:
+    """A step times rate, or a relative tolerance from a power of ten on."""
+    return 10 ** (chance.uniform(-2, -0.7) if method in ("rk4", "heun") else chance.uniform(least, -3))
+
+
 def a_file(chance: random.Random, convention: Any, rates: bool = True) -> tuple[Comparison, str]:
     """Judge the file of a loose or tight integration: the result, and what is wrong; empty for nothing."""
     model = Model.drawn(chance)
     method = chance.choice(METHODS)
-    steps = method in ("rk4", "heun")
-    accuracy = 10 ** (chance.uniform(-2, -0.7) if steps else chance.uniform(-10, -3))
+    accuracy, times = loose(method, chance, -10), spaced(model, chance)
     size = float(np.linalg.norm(model.rates))
-    times = np.linspace(0, model.end, max(8, round(model.end * size / 10 ** chance.uniform(-1.7, 0))))
     rows, exact = model.rows(method, accuracy, times), model.rows("DOP853", 3e-14, times)
     found = judged(model, times, written(convention, rows, chance), rates)
     true = float(angles(rows, exact).max())
@@ -205,8 +209,7 @@ def a_model(chance: random.Random, convention: Any, rates: bool = True) -> tuple
         "missing": lambda: replace(model, load=0.0),
     }[wrong]()
     accuracy = 10 ** chance.uniform(-12, -9)
-    size = float(np.linalg.norm(model.rates))
-    times = np.linspace(0, model.end, max(8, round(model.end * size / 10 ** chance.uniform(-1.7, 0))))
+    times = spaced(model, chance)
     rows = other.rows("DOP853", accuracy, times)
     found = judged(model, times, written(convention, rows, chance), rates)
     if found.verdict in ("integration_error", "agrees"):
@@ -266,17 +269,14 @@ def a_mixed_file(seed: object) -> Mixed:
     other, method, accuracy, label = model, "DOP853", 3e-14, truth
     if truth == "loose":
         method = chance.choice([m for m in METHODS if not uneven or m not in ("rk4", "heun")])
-        steps = method in ("rk4", "heun")
-        accuracy = 10 ** (chance.uniform(-2, -0.7) if steps else chance.uniform(-8, -3))
+        accuracy = loose(method, chance, -8)
         label = f"{method} {accuracy:.0e}"
     if truth == "model":
         change, axis = 10 ** chance.uniform(-4, -0.7), chance.randrange(3)
         other = replace(model, moments=model.moments * (1 + change * np.eye(3)[axis]))
         label = f"moment {axis} {change:+.0e}"
     exact = model.rows("DOP853", 3e-14, times)
-    rows = exact if other is model and method == "DOP853" and accuracy < 1e-13 else other.rows(
-        method, accuracy, times
-    )  # fmt: skip
+    rows = other.rows(method, accuracy, times)
     error = float(angles(rows, exact).max())
     attitude, rates = rows[:, :4], rows[:, 4:]
     way = chance.choice(WAYS) if kind == "contradicting" else ""
@@ -304,83 +304,62 @@ def a_mixed_file(seed: object) -> Mixed:
     columns = {"t": written_times, "q": attitude[:, order]} | ({} if kind == "none" else {"w": rates})
     found = rigidsim.compare(rigidsim.parse(model.config), columns)
     steps = np.linalg.norm(exact[:-1, 4:], axis=1) * np.diff(times)
-    return Mixed(
-        truth,
-        way,
-        kind != "none",
-        uneven,
-        float(np.degrees(steps.max())),
-        error,
-        f"{model.kind} {label}",
-        found,
-    )
+    widest, label = float(np.degrees(steps.max())), f"{model.kind} {label}"
+    return Mixed(truth, way, kind != "none", uneven, widest, error, label, found)
 
 
-def mixed_campaign(count: int, seed: int, told: Callable[[str], None] = print) -> int:
+def counted(seen: Counter[str]) -> str:
+    """Verdicts, and how often they were given."""
+    return ", ".join(f"{verdict} {n}" for verdict, n in sorted(seen.items()))
+
+
+def mixed_campaign(count: int, seed: int) -> int:
     """Judge so many mixed files, and print the table; the number of false verdicts."""
     made = []
     for number in range(count):
         one = a_mixed_file(f"{seed} {number}")
         made.append(one)
         if one.wrong or (one.found.verdict == "undecided" and one.widest <= NEAR):
-            told(
+            print(
                 f"{number}: {one.wrong or 'undecided'}: {one.label} {one.way} rates {one.rates} uneven "
                 f"{one.uneven}, {len(one.found.dataset.time)} rows, {one.widest:.0f} deg, true error "
                 f"{one.error:.2g}, {one.found.attitude_error.largest:.2g} found: {one.found.why}"
             )
     for name in (*TRUTHS, *WAYS):
         some = [x for x in made if (x.way or x.truth) == name]
-        seen = Counter(x.found.verdict for x in some)
-        told(
-            f"{name:12} {len(some):4}  " + ", ".join(f"{verdict} {n}" for verdict, n in sorted(seen.items()))
-        )
+        print(f"{name:12} {len(some):4}  {counted(Counter(x.found.verdict for x in some))}")
     near = [x for x in made if x.widest <= NEAR]
     undecided = sum(x.found.verdict == "undecided" for x in near)
-    told(f"{undecided} undecided of {len(near)} files with rows at most {NEAR:g} deg apart")
-    told(", ".join(f"{n} {what}" for what, n in Counter(x.wrong or "right" for x in made).items()))
+    print(f"{undecided} undecided of {len(near)} files with rows at most {NEAR:g} deg apart")
+    print(", ".join(f"{n} {what}" for what, n in Counter(x.wrong or "right" for x in made).items()))
     return sum(bool(x.wrong) for x in made)
 
 
-def campaign(
-    files: int, models: int, seed: int, told: Callable[[str], None] = print, rates: bool = True
-) -> int:
-    """Judge so many files and other models; the number of failures."""
+@Command
+def campaign(files: int = 24, models: int = 16, seed: int = 1, no_rates: bool = False, mixed: int = 0) -> int:
+    """Judge so many files and other models, or mixed files instead; 1 if something failed."""
+    if mixed:
+        return int(bool(mixed_campaign(mixed, seed)))
     failures = 0
     for what, judge, count in (("files", a_file, files), ("other models", a_model, models)):
         seen: Counter[str] = Counter()
         shares: list[float] = []
         for number in range(count):
-            found, wrong = judge(
-                random.Random(f"{seed} {what} {number}"), CONVENTIONS[number % len(CONVENTIONS)], rates
+            chance, convention = (
+                random.Random(f"{seed} {what} {number}"),
+                CONVENTIONS[number % len(CONVENTIONS)],
             )
+            found, wrong = judge(chance, convention, not no_rates)
             seen[found.verdict] += 1
             local = found.local_defects
             if found.verdict != "agrees" and local is not None and local.unexplained is not None:
                 shares.append(local.unexplained)
             if wrong:
                 failures += 1
-                told(f"{what} {number}: {wrong}")
-        told(f"{count} {what}: " + ", ".join(f"{verdict} {n}" for verdict, n in sorted(seen.items())))
+                print(f"{what} {number}: {wrong}")
+        print(f"{count} {what}: {counted(seen)}")
         if shares:
             quantiles = ", ".join(f"{x:.2g}" for x in np.quantile(shares, QUANTILES))
-            told(f"  shares of {len(shares)}, by quantiles {', '.join(map(str, QUANTILES))}: {quantiles}")
-    told(f"{failures} failures")
-    return failures
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Command line; 1 if something failed."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--files", type=int, default=24, help="of other integrators")
-    parser.add_argument("--models", type=int, default=16, help="that are others")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--no-rates", action="store_true", help="files have attitudes alone")
-    parser.add_argument("--mixed", type=int, default=0, help="files of all kinds, instead")
-    given = parser.parse_args(arguments)
-    if given.mixed:
-        return 1 if mixed_campaign(given.mixed, given.seed) else 0
-    return 1 if campaign(given.files, given.models, given.seed, rates=not given.no_rates) else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+            print(f"  shares of {len(shares)}, by quantiles {', '.join(map(str, QUANTILES))}: {quantiles}")
+    print(f"{failures} failures")
+    return int(failures > 0)

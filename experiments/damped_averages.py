@@ -1,18 +1,10 @@
 """A rotation that is damped: how far is its average from the full motion, in momentum, energy and wobble?
 
-Method: a body with moments 1 : 1.7 : 2 that tumbles, under a viscous torque that takes nine tenths of its
-energy over 10,000 turns (--full; 1,000 with ten times the torque otherwise), alone and under a gravity
-gradient beside it; every rotation resolved, and averaged. An axisymmetric body, whose rates decay
-exponentially. The first body at eight sizes of the torque. Then random bodies with random torques (40 with
---full, 10 otherwise), of which each averaged run announces its errors.
-
-Held against:
-- the errors that the averaged runs announce for the momentum's direction, its size and the energy;
-- the wobble, the angle from the axis of the largest moment to the momentum: its extremes in the last of 50
-  parts of the full motion, and those of the free motion with the averaged momentum and energy, within what
-  their announced errors and their change over that part make of these;
-- the exact solution of the axisymmetric body, to the tolerance over ten e-foldings;
-- the order: errors are in proportion to the torque over momentum times rate, if the same share is lost.
+A body with moments 1 : 1.7 : 2 tumbles under a viscous torque that takes nine tenths of its energy over
+10,000 turns (--full; 1,000 with ten times the torque otherwise), alone and under a gravity gradient; again at
+eight sizes of the torque, to which errors are proportional if the same share is lost. An axisymmetric body's
+rates decay exponentially. Random bodies with random torques (40 with --full, 10 otherwise) announce their
+errors.
 """
 
 import sys
@@ -20,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.common import Answer, Check, Curve, Panel, Picture, Result, Study, simulate
-from experiments.tumbling_averages import extremes, wobble
+from experiments.common import Answer, Check, Curve, Panel, Picture, Result, Study, covered, simulate
+from experiments.tumbling_averages import extremes, wobble, wobbles
 from rigidsim.errors import ConfigError
 
 CONFIG = """
@@ -94,9 +86,8 @@ def tumbler(size: float, end: float, gradient: str = "") -> Scene:
 
 def distances(averaged: Result, full: Result) -> dict[str, np.ndarray]:
     """Of the averaged motion from the full one at the samples: rad, and relative."""
-    axes = averaged.values("momentum_axis") - full.values("momentum_axis")
     return {
-        "momentum_axis": np.linalg.norm(axes, axis=1),
+        "momentum_axis": averaged.apart(full),
         "angular_momentum_norm": np.abs(
             averaged.values("angular_momentum_norm") / full.values("angular_momentum_norm") - 1
         ),
@@ -104,42 +95,14 @@ def distances(averaged: Result, full: Result) -> dict[str, np.ndarray]:
     }
 
 
-def covered(title: str, averaged: Result, full: Result) -> list[Check]:
-    """Errors over what is announced."""
-    checks = []
-    for name, error in distances(averaged, full).items():
-        announced = float(averaged.summary["modelling"][name])
-        print(f"{title}: {ANNOUNCED[name]} {error.max():.2g}, {announced:.2g} announced", file=sys.stderr)
-        source = "summary.json, modelling: not above 1"
-        words = f"{title}: {ANNOUNCED[name]} from the full motion's, over what is announced"
-        checks.append(Check(words, float(error.max()) / announced, 0.5, 0.5, "1", source, "absolute"))
-    return checks
-
-
-def wobbles(scene: Scene, averaged: Result, full: Result) -> list[Check]:
+def wobble_checks(scene: Scene, averaged: Result, full: Result) -> list[Check]:
     """The wobble in the last part of the full motion, and that of the averaged momentum and energy."""
-    last = slice(-(SAMPLES // PARTS), None)
-    size, energy = (averaged.values(name)[last] for name in ("angular_momentum_norm", "energy"))
-    bounds = np.array([extremes(np.array(scene.moments), e, s) for e, s in zip(energy, size, strict=True)])
-    announced = [averaged.summary["modelling"][name] for name in ("energy", "angular_momentum_norm")]
-    middle = extremes(np.array(scene.moments), energy.mean(), size.mean())
-    moved = [
-        extremes(
-            np.array(scene.moments),
-            energy.mean() * (1 + x * announced[0]),
-            size.mean() * (1 + y * announced[1]),
-        )
-        for x in (-1, 1)
-        for y in (-1, 1)
-    ]
-    seen, checks = wobble(full)[last], []
-    for number, (word, value) in enumerate((("least", seen.min()), ("largest", seen.max()))):
-        allowed = max(abs(m[number] - middle[number]) for m in moved) + float(np.ptp(bounds[:, number]))
-        name = f"tumbler: {word} wobble in the last fiftieth"
-        source = "free motion of the averaged momentum and energy; announced errors and change meanwhile"
-        degrees = (float(np.degrees(x)) for x in (value, middle[number], allowed))
-        checks.append(Check(name, *degrees, "deg", source, "absolute"))
-    return checks
+    moments, last = np.array(scene.moments), slice(-(SAMPLES // PARTS), None)
+    both = [averaged.values(name)[last] for name in ("energy", "angular_momentum_norm")]
+    bounds = np.array([extremes(moments, e, s) for e, s in zip(*both, strict=True)])
+    announced = [averaged.announced(name) for name in ("energy", "angular_momentum_norm")]
+    given, source = [x.mean() for x in both], "free motion; announced errors and change meanwhile"
+    return wobbles("fiftieth", moments, given, announced, wobble(full)[last], source, np.ptp(bounds, axis=0))
 
 
 def axisymmetric() -> Check:
@@ -206,9 +169,8 @@ def campaign(count: int) -> tuple[list[Check], np.ndarray, int]:
             refused += 1
             print(f"random {number - 1}: {error.problems[0].what[:200]}", file=sys.stderr)
             continue
-        announced = averaged.summary["modelling"]
         apart = distances(averaged, scene.run("full"))
-        ratios.append([float(apart[name].max()) / float(announced[name]) for name in ANNOUNCED])
+        ratios.append([float(apart[name].max()) / averaged.announced(name) for name in ANNOUNCED])
         print(f"random {number - 1}: {ratios[-1]} of what is announced", file=sys.stderr)
     found = np.array(ratios)
     checks = [
@@ -219,32 +181,6 @@ def campaign(count: int) -> tuple[list[Check], np.ndarray, int]:
         for i, words in enumerate(ANNOUNCED.values())
     ]  # fmt: skip
     return checks, found, refused
-
-
-@Study
-def study(full: bool) -> Answer:
-    """All of it; see the module's text."""
-    size, end = (2.5e-5, 5e4) if full else (2.5e-4, 5e3)
-    scenes = {
-        "tumbler": tumbler(size, end),
-        "with a gradient": tumbler(size, end, GRADIENT.format(square=4e-5, e=0.1, tilt=20)),
-    }
-    checks: list[Check] = []
-    runs: dict[str, dict[str, Result]] = {}
-    for title, scene in scenes.items():
-        found = runs[title] = {level: scene.run(level) for level in ("full", "spin_averaged")}
-        for level, result in found.items():
-            cpu = result.summary["cost"]["cpu_by_phase"]["integrate_and_record"]
-            print(f"{title}, {level}: {result.steps:,d} steps, {cpu:.3g} s", file=sys.stderr)
-        checks += covered(title, found["spin_averaged"], found["full"])
-    checks += wobbles(scenes["tumbler"], runs["tumbler"]["spin_averaged"], runs["tumbler"]["full"])
-    checks.append(axisymmetric())
-    sizes = 2e-3 / 2.0 ** np.arange(8 if full else 5)
-    slopes, errors = orders(sizes)
-    rows, ratios, refused = campaign(40 if full else 10)
-    print(f"random bodies: {refused} refused", file=sys.stderr)
-    figure = picture(scenes["tumbler"], runs["tumbler"], (sizes, errors), ratios)
-    return checks + slopes + rows, figure
 
 
 def picture(
@@ -262,7 +198,7 @@ def picture(
     along, order, beside = [], [], [Curve(None, 1.0, "", "red", width=1)]
     for i, (color, (name, label)) in enumerate(zip(colors, ANNOUNCED.items(), strict=True)):
         along += [Curve(time, np.maximum(away[name], 1e-12), label, color, ".", 0.5),
-                  Curve(None, averaged.summary["modelling"][name], "", color, "--", 0.9)]  # fmt: skip
+                  Curve(None, averaged.announced(name), "", color, "--", 0.9)]  # fmt: skip
         order.append(Curve(sizes, errors[name], label, color, "o-"))
         beside.append(Curve(np.arange(len(ratios)), ratios[:, i], label, color, "o"))
     line = errors["angular_momentum_norm"][0] / 2 * sizes / sizes[0]
@@ -281,5 +217,28 @@ def picture(
     ], (11.5, 8.2))  # fmt: skip
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool) -> Answer:
+    """All of it; see the module's text."""
+    size, end = (2.5e-5, 5e4) if full else (2.5e-4, 5e3)
+    scenes = {
+        "tumbler": tumbler(size, end),
+        "with a gradient": tumbler(size, end, GRADIENT.format(square=4e-5, e=0.1, tilt=20)),
+    }
+    checks: list[Check] = []
+    runs: dict[str, dict[str, Result]] = {}
+    for title, scene in scenes.items():
+        levels = ("full", "spin_averaged")
+        runs[title] = {level: scene.run(level).told(f"{title}, {level}") for level in levels}
+        full_one, averaged = runs[title].values()
+        checks += [
+            covered(f"{title}: {ANNOUNCED[name]}", error, averaged.announced(name))
+            for name, error in distances(averaged, full_one).items()
+        ]
+    checks += wobble_checks(scenes["tumbler"], runs["tumbler"]["spin_averaged"], runs["tumbler"]["full"])
+    checks.append(axisymmetric())
+    sizes = 2e-3 / 2.0 ** np.arange(8 if full else 5)
+    slopes, errors = orders(sizes)
+    rows, ratios, refused = campaign(40 if full else 10)
+    print(f"random bodies: {refused} refused", file=sys.stderr)
+    return checks + slopes + rows, picture(scenes["tumbler"], runs["tumbler"], (sizes, errors), ratios)

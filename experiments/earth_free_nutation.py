@@ -27,6 +27,34 @@ def pole_rate(result: Result) -> float:
     return phase_rate(result.values("time"), np.arctan2(w[:, 1], w[:, 0]))
 
 
+def picture(result: Result, days: dict[str, float]) -> Picture:
+    """The pole's path over one turn, and the three periods."""
+    period = days["measured moments"]
+    w, time = result.values("angular_velocity"), result.values("time") / DAY
+    arcsec = np.degrees(w[:, :2] / w[:, 2:3]) * 3600
+    turn, span, marks = time <= period, time <= 900, arcsec[0:304:50]
+
+    def named(axes: Any) -> None:
+        for number, mark in enumerate(marks):
+            axes.annotate(f"day {50 * number}", 0.8 * mark, ha="center", va="center", fontsize=8.5)
+
+    periods = [Curve(n * period, None, label, "orange", "--")
+               for n, label in ((1, f"{period:.2f} d and twice that"), (2, ""))]  # fmt: skip
+
+    def band(axes: Any) -> None:
+        axes.axvspan(*CHANDLER, color=COLORS["red"], alpha=0.25, label="Chandler's period (elastic)")
+
+    return Picture(f"A rigid Earth nutates in {period:.2f} days, not in Chandler's 427 to 435", "ab", [
+        Panel("One turn of the pole, in the body", "pole along x (arcsec)", "pole along y (arcsec)",
+              [Curve(*arcsec[turn].T, width=2), Curve(*marks.T, style="o"), Curve(0, 0, "", "grey", "+", 3)],
+              equal=True, more=named),
+        Panel("Measured moments, (C - A)/C = 0.00327379492", "time (mean solar days)",
+              "pole along x (arcsec)",
+              [Curve(time[span], arcsec[span, 0], "rigid Earth: pole along x"), *periods],
+              limits={"ylim": (-0.23, 0.33)}, legend="upper right", more=band),
+    ], (11, 5.2), {"width_ratios": [1, 1.5]})  # fmt: skip
+
+
 @Study
 def study(full: bool, flattening: str = FLATTENING) -> Answer:
     """Both Earths against Euler; see the module's text.
@@ -67,37 +95,4 @@ def study(full: bool, flattening: str = FLATTENING) -> Answer:
         Check("NOT Chandler's period (axes)", days["axes"], sum(CHANDLER) / 2,
               (CHANDLER[1] - CHANDLER[0]) / 2, "days", "as above", "apart"),
     ]  # fmt: skip
-    figure = picture(measured, days)
-    return checks, figure
-
-
-def picture(result: Result, days: dict[str, float]) -> Picture:
-    """The pole's path over one turn, and the three periods."""
-    period = days["measured moments"]
-    w, time = result.values("angular_velocity"), result.values("time") / DAY
-    arcsec = np.degrees(w[:, :2] / w[:, 2:3]) * 3600
-    turn, span, marks = time <= period, time <= 900, arcsec[0:304:50]
-
-    def named(axes: Any) -> None:
-        for number, mark in enumerate(marks):
-            axes.annotate(f"day {50 * number}", 0.8 * mark, ha="center", va="center", fontsize=8.5)
-
-    periods = [Curve(n * period, None, label, "orange", "--")
-               for n, label in ((1, f"{period:.2f} d and twice that"), (2, ""))]  # fmt: skip
-
-    def band(axes: Any) -> None:
-        axes.axvspan(*CHANDLER, color=COLORS["red"], alpha=0.25, label="Chandler's period (elastic)")
-
-    return Picture(f"A rigid Earth nutates in {period:.2f} days, not in Chandler's 427 to 435", "ab", [
-        Panel("One turn of the pole, in the body", "pole along x (arcsec)", "pole along y (arcsec)",
-              [Curve(*arcsec[turn].T, width=2), Curve(*marks.T, style="o"), Curve(0, 0, "", "grey", "+", 3)],
-              equal=True, more=named),
-        Panel("Measured moments, (C - A)/C = 0.00327379492", "time (mean solar days)",
-              "pole along x (arcsec)",
-              [Curve(time[span], arcsec[span, 0], "rigid Earth: pole along x"), *periods],
-              limits={"ylim": (-0.23, 0.33)}, legend="upper right", more=band),
-    ], (11, 5.2), {"width_ratios": [1, 1.5]})  # fmt: skip
-
-
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+    return checks, picture(measured, days)

@@ -12,7 +12,7 @@ import sys
 
 import numpy as np
 
-from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Result, Study, simulate
+from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Result, Study, covered, simulate
 
 TABLE = CONFIGS / "tables" / "earth_secular.csv"
 YEAR, ARCSEC = 31557600.0, np.pi / 648000
@@ -86,13 +86,6 @@ def run(
     return simulate(text + tables)
 
 
-def told(name: str, result: Result) -> float:
-    """Steps and CPU of a run, on stderr; returns CPU seconds of integrating and recording."""
-    cpu = float(result.summary["cost"]["cpu_by_phase"]["integrate_and_record"])
-    print(f"{name:40s} {result.steps:12,d} steps, integrate and record {cpu:.3g} s", file=sys.stderr)
-    return cpu
-
-
 def normals() -> np.ndarray:
     """(rows, 3): of the moving orbit."""
     i, node = np.radians(columns()[:, 2:4]).T
@@ -140,65 +133,22 @@ def precession_rate(years: float) -> float:
 def beside(span: int) -> list[Check]:
     """The average by the table beside every rotation, over so many years."""
     levels = ("orbit_averaged", "full")
-    found = [run(level, span, span / 100, moving=True, estimate=level != "full") for level in levels]
-    for level, result in zip(levels, found, strict=True):
-        told(f"moving orbit, {span} years, {level}", result)
-    distance = found[0].values("momentum_axis") - found[1].values("momentum_axis")
-    apart = float(np.linalg.norm(distance, axis=1).max())
-    announced = float(found[0].summary["modelling"]["momentum_axis"])
-    print(f"moving orbit, {span} years: {apart:.2g} rad apart, {announced:.2g} announced", file=sys.stderr)
-    name = "moving orbit: the average from the full motion, over what is announced"
-    source = "summary.json, modelling: not above 1"
-    return [Check(name, apart / announced, 0.5, 0.5, "1", source, "absolute")]
+    averaged, full = (
+        run(level, span, span / 100, moving=True, estimate=level != "full").told(f"{span} years, {level}")
+        for level in levels
+    )
+    return [covered("moving orbit: the average", averaged.apart(full), averaged.announced())]
 
 
 def sun_alone() -> Check:
     """What averaging over the rotation saves where the year sets the steps."""
     levels = ("full", "spin_averaged")
-    runs = [run(level, 1000, 100, moon=False) for level in levels]
-    seconds = [told(f"Sun alone, 1000 years, {x}", found) for x, found in zip(levels, runs, strict=True)]
-    share = runs[1].steps / runs[0].steps
-    saved = f"{1 / share:.0f} times fewer steps, {seconds[0] / seconds[1]:.0f} times less CPU"
+    full, averaged = (run(x, 1000, 100, moon=False).told(f"Sun alone, 1000 years, {x}") for x in levels)
+    share = averaged.steps / full.steps
+    saved = f"{1 / share:.0f} times fewer steps, {full.seconds / averaged.seconds:.0f} times less CPU"
     print(f"Sun alone: spin_averaged takes {saved}", file=sys.stderr)
     name = "Sun alone: steps of spin_averaged over the full model's"
     return Check(name, share, 0.0, 0.01, "1", "a hundredth, as asked", "absolute")
-
-
-@Study
-def study(full: bool) -> Answer:
-    """Both orbits, and the Sun alone; see the module's text."""
-    planes, years = normals(), columns()[:, 0]
-    end = float(years[-1])
-    fixed = run("orbit_averaged", end, 500, estimate=True)
-    told("fixed orbit, orbit_averaged", fixed)
-    moving = run("orbit_averaged", end, None, moving=True, estimate=True)
-    told("moving orbit, orbit_averaged", moving)
-    still = obliquity(fixed.values("momentum_axis"), np.array([[0.0, 0.0, 1.0]]))
-    tenth = len(still) // 10
-    tilt = np.degrees(obliquity(moving.values("momentum_axis"), planes))
-    turn = longitude(moving.values("momentum_axis"), planes)
-    first = float(years[1])
-    slope = np.radians(tilt[1] - tilt[0]) / first / ARCSEC * 100
-    general = -(turn[1] - turn[0]) / first / ARCSEC
-    middle = (tilt.max() + tilt.min()) / 2
-    swing = (tilt.max() - tilt.min()) / 2
-    print(f"moving orbit: {tilt.min():.3f} to {tilt.max():.3f} deg", file=sys.stderr)
-    change = float(still[-tenth:].mean() - still[:tenth].mean())
-    known = float(fixed.summary["modelling"]["momentum_axis"])
-    iau, laskar = "IAU 2006; mean over the first row", "Laskar et al. 1993"
-    checks = [
-        Check("fixed orbit: change of the mean obliquity", change, 0.0, known, "rad", "none; announced error",
-              "absolute"),
-        Check("moving orbit: obliquity's rate", slope, obliquity_rate(first), 0.01, "arcsec/cy", iau),
-        Check("moving orbit: middle of its range", middle, 23.3, 0.1, "deg", laskar, "absolute"),
-        Check("moving orbit: half its range", swing, 0.65, 0.65, "deg", f"{laskar}: at most 1.3", "absolute"),
-        Check("moving orbit: period of obliquity", period(years, tilt), 41000.0, 0.02, "yr", "Berger 1976"),
-        Check("moving orbit: general precession", general, precession_rate(first), 0.002, "arcsec/yr", iau),
-        *beside(1000 if full else 50),
-        sun_alone(),
-    ]  # fmt: skip
-    figure = picture(fixed, years, tilt)
-    return checks, figure
 
 
 def picture(fixed: Result, years: np.ndarray, tilt: np.ndarray) -> Picture:
@@ -215,5 +165,35 @@ def picture(fixed: Result, years: np.ndarray, tilt: np.ndarray) -> Picture:
     ], (11.5, 5.6))  # fmt: skip
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool) -> Answer:
+    """Both orbits, and the Sun alone; see the module's text."""
+    planes, years = normals(), columns()[:, 0]
+    end = float(years[-1])
+    fixed = run("orbit_averaged", end, 500, estimate=True).told("fixed orbit, orbit_averaged")
+    moving = run("orbit_averaged", end, None, moving=True, estimate=True)
+    moving.told("moving orbit, orbit_averaged")
+    still = obliquity(fixed.values("momentum_axis"), np.array([[0.0, 0.0, 1.0]]))
+    tenth = len(still) // 10
+    tilt = np.degrees(obliquity(moving.values("momentum_axis"), planes))
+    turn = longitude(moving.values("momentum_axis"), planes)
+    first = float(years[1])
+    slope = np.radians(tilt[1] - tilt[0]) / first / ARCSEC * 100
+    general = -(turn[1] - turn[0]) / first / ARCSEC
+    middle = (tilt.max() + tilt.min()) / 2
+    swing = (tilt.max() - tilt.min()) / 2
+    print(f"moving orbit: {tilt.min():.3f} to {tilt.max():.3f} deg", file=sys.stderr)
+    change = float(still[-tenth:].mean() - still[:tenth].mean())
+    iau, laskar = "IAU 2006; mean over the first row", "Laskar et al. 1993"
+    checks = [
+        Check("fixed orbit: change of the mean obliquity", change, 0.0, fixed.announced(), "rad",
+              "none; announced error", "absolute"),
+        Check("moving orbit: obliquity's rate", slope, obliquity_rate(first), 0.01, "arcsec/cy", iau),
+        Check("moving orbit: middle of its range", middle, 23.3, 0.1, "deg", laskar, "absolute"),
+        Check("moving orbit: half its range", swing, 0.65, 0.65, "deg", f"{laskar}: at most 1.3", "absolute"),
+        Check("moving orbit: period of obliquity", period(years, tilt), 41000.0, 0.02, "yr", "Berger 1976"),
+        Check("moving orbit: general precession", general, precession_rate(first), 0.002, "arcsec/yr", iau),
+        *beside(1000 if full else 50),
+        sun_alone(),
+    ]  # fmt: skip
+    return checks, picture(fixed, years, tilt)

@@ -5,89 +5,22 @@ double, 128 for these), or from an exact solution where a kink would mislead eve
 are those in which estimates are most likely to be wrong; all formulations, three precisions, loose tolerances
 and projected invariants take part.
 
-Run: python -m experiments.error_coverage [--count 1000] [--seed 1] [--share 1/2] [--seconds S] [--out DIR]
-Outcomes are appended to DIR/error_coverage.jsonl one by one; what is there already, of the same seed and
-code, isn't repeated, so that a campaign can be stopped and gone on with. ``--only FAMILY`` looks at one.
+Run: python -m experiments.error_coverage [--first 0] [--count 1000] [--seed 1] [--only FAMILY]
 Exit code 1 if a promise was broken.
 """
 
-import argparse
-import hashlib
-import json
 import math
-import os
-import time
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict
-from pathlib import Path
+from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 
-import rigidsim
-from experiments import common
+from experiments.common import Command
 from experiments.coverage.averages import judge_average
 from experiments.coverage.families import FAMILIES, coverage_scene
 from experiments.coverage.judging import Judged, judge
 
-NAME = "error_coverage"
 FALSE_ALARM = 1e-4  # rad
-
-
-def code_version() -> str:
-    """Digest of what decides an outcome: the sources of rigidsim and of the studies."""
-    folders = [Path(rigidsim.__file__).parent, Path(__file__).parent]
-    digest = hashlib.sha256()
-    for path in (path for folder in folders for path in sorted(folder.rglob("*.py"))):
-        digest.update(path.name.encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()[:12]
-
-
-def campaign(numbers: Iterable[int], seed: int, out: Path, seconds: float = math.inf) -> list[Judged]:
-    """Judge scenes, those that the file doesn't know yet; returns all that are known.
-
-    Args:
-        seconds: after which no other scene is begun.
-    """
-    path, version, started = out / f"{NAME}.jsonl", code_version(), time.monotonic()
-    numbers = list(numbers)
-    known = read(path, seed, version)
-    for number in (n for n in numbers if n not in known):
-        if time.monotonic() - started > seconds:
-            break
-        scene = coverage_scene(number, seed)
-        try:
-            found = (judge_average if FAMILIES[scene.family].averaged else judge)(scene)
-        except Exception as error:  # a scene that breaks the study is an outcome, and fails it
-            found = Judged(number, scene.family, f"{type(error).__name__}: {error}"[:200], "broken")
-        known[number] = found
-        _append(path, {"seed": seed, "version": version, **asdict(found)})
-        print(found.line, flush=True)
-    return [known[n] for n in numbers if n in known]
-
-
-def read(path: Path, seed: int, version: str) -> dict[int, Judged]:
-    """The outcomes of a seed and a state of the code, by number."""
-    known: dict[int, Judged] = {}
-    if path.exists():
-        for line in path.read_text(encoding="utf-8").splitlines():
-            try:
-                row = json.loads(line)
-            except ValueError:
-                continue  # cut short
-            if row.pop("seed") == seed and row.pop("version") == version:
-                row = {k: math.nan if v is None else v for k, v in row.items()}
-                known[row["number"]] = Judged(**row)
-    return known
-
-
-def _append(path: Path, row: dict[str, object]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    row = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in row.items()}
-    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
-    try:
-        os.write(descriptor, (json.dumps(row) + "\n").encode())
-    finally:
-        os.close(descriptor)
 
 
 def ratios(judged: Sequence[Judged], place: bool = False) -> list[tuple[Judged, float]]:
@@ -111,9 +44,7 @@ def table(judged: Sequence[Judged]) -> list[str]:
         if mine:
             lines.append(_row(name or "**all, attitude**", ratios(mine)))
     lines.append(_row("**all, position**", ratios(judged, place=True)))
-    ended: dict[str, int] = {}
-    for one in judged:
-        ended[one.ended] = ended.get(one.ended, 0) + 1
+    ended = Counter(one.ended for one in judged)
     lines.append("\n" + ", ".join(f"{count} {how}" for how, count in sorted(ended.items())))
     return lines
 
@@ -158,48 +89,19 @@ def broken_promises(judged: Sequence[Judged]) -> list[str]:
     return problems
 
 
-def costs(judged: Sequence[Judged]) -> str:
-    """Of the estimate, over runs above a second and below."""
-    long = [one.estimate_seconds / one.run_seconds for one in judged if one.run_seconds >= 1]
-    short = [one.estimate_seconds for one in judged if 0 < one.run_seconds < 1 and one.ended == "finished"]
-
-    def shown(values: Sequence[float], unit: str) -> str:
-        if not values:
-            return "none"
-        middle, high = np.quantile(values, [0.5, 0.9])
-        text = ", ".join(
-            f"{name} {value:.3g}{unit}"
-            for name, value in (("median", middle), ("90 %", high), ("largest", max(values)))
-        )
-        return f"{text} of {len(values)}"
-
-    return f"cost of integrations above 1 s: {shown(long, '')}; below: {shown(short, ' s')}"
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """The command; returns its exit code."""
-    parser = argparse.ArgumentParser(prog=f"python -m experiments.{NAME}")
-    parser.add_argument("--count", type=int, default=1000)
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--share", default="1/1", metavar="K/N", help="every Nth scene, from the Kth on")
-    parser.add_argument("--seconds", type=float, default=math.inf, help="begin no scene after that")
-    parser.add_argument("--only", choices=list(FAMILIES))
-    parser.add_argument("--out", type=Path, default=common.DEFAULT_OUT)
-    arguments = parser.parse_args(argv)
-    share, _, of = arguments.share.partition("/")
-    if not (share.isdecimal() and of.isdecimal() and 1 <= int(share) <= int(of)):
-        raise SystemExit("give --share as 1/2 or 2/2")
-    numbers = list(range(arguments.first, arguments.first + arguments.count))[int(share) - 1 :: int(of)]
-    if arguments.only:
-        place = list(FAMILIES).index(arguments.only)
-        numbers = [n for n in numbers if n % len(FAMILIES) == place]
-    judged = campaign(numbers, arguments.seed, arguments.out, arguments.seconds)
-    print("\n".join(["", *table(judged), costs(judged)]))
+@Command
+def campaign(first: int = 0, count: int = 1000, seed: int = 1, only: str = "") -> int:
+    """Judge scenes, and print a line for each, the table, and the promises that were broken."""
+    judged = []
+    for number in range(first, first + count):
+        scene = coverage_scene(number, seed)
+        if only in ("", scene.family):
+            try:
+                judged.append((judge_average if FAMILIES[scene.family].averaged else judge)(scene))
+            except Exception as error:  # a scene that breaks the study is an outcome, and fails it
+                text = f"{type(error).__name__}: {error}"[:200]
+                judged.append(Judged(number, scene.family, text, "broken"))
+            print(judged[-1].line, flush=True)
     problems = broken_promises(judged)
-    print("\n".join(problems) or "every promise was kept")
+    print("\n".join(["", *table(judged), *(problems or ["every promise was kept"])]))
     return int(bool(problems))
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

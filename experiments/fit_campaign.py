@@ -1,37 +1,33 @@
 """Are the sigmas of `fit` right, and does it say what data can't determine?
 
-Method: random bodies, free, braked or under gravity about a fixed point, are integrated by SciPy's DOP853 at
-3e-14 (which shares no code with rigidsim), seen at random times with noise of known size, as quaternions or
-Euler angles, as angular velocities, or both. `fit` starts elsewhere, and near where the body is a top, which
-may be chaotic. Some numbers have a prior from which the config's value was drawn; in some scenes the load is
-only considered, and drawn from its sigma, too.
+Random bodies, free, braked or under gravity about a fixed point, are integrated by SciPy's DOP853 at 3e-14,
+seen at random times with noise of known size, as quaternions or Euler angles, as angular velocities, or both.
+`fit` starts elsewhere, and near where the body is a top, which may be chaotic. Some numbers have a prior from
+which the config's value was drawn; in some scenes the load is only considered, and drawn from its sigma, too.
 
 Checked: e' P^-1 e of each scene, with e the errors of the estimate and P its covariance, is chi-square
-distributed (Kolmogorov's p above 0.01), and 68.3 and 95.4 % of all errors are within one and two sigmas to
-3 %. In scenes with directions that are undetermined by symmetry or scaling, each is found and nothing else.
-The covariance with a considered number is that of Tapley, Schutz and Born's formula, by derivatives from
-SciPy's motions, to 1e-6.
+distributed (Kolmogorov's p above 0.01), and 68.3 and 95.4 % of all errors are within one and two sigmas to 3
+%. Directions that are undetermined by symmetry or scaling are found, and nothing else. The covariance with a
+considered number is that of Tapley, Schutz and Born's formula, by derivatives from SciPy's motions, to 1e-6.
 
-Run: python -m experiments.fit_campaign [--scenes N] [--undetermined N] [--seed N]      Exit: 1 if one fails
+Run: python -m experiments.fit_campaign [--scenes N] [--nulls N] [--seed N]      exit code 1 if one fails
 """
 
-import argparse
 import random
-import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2, kstest
 
 import rigidsim
+from experiments.common import Command
 from experiments.compare_conventions import Model
+from experiments.fitted_bodies import MOMENTS, observations
 
-Told = Callable[[str], None]
 LOADS = {"braked": "loads[0].coefficients[2]", "top": "loads[0].acceleration[2]"}
 ATTITUDE, RATES = "initial.attitude", "initial.angular_velocity"
 
@@ -94,6 +90,14 @@ def config_of(start: Model, model: Model) -> str:
     return text
 
 
+def drawn(chance: random.Random, kind: str) -> Model:
+    """A random model of a kind."""
+    model = Model.drawn(chance)
+    while model.kind != kind:
+        model = Model.drawn(chance)
+    return model
+
+
 def observed(
     model: Model, times: np.ndarray, chance: random.Random, noise: np.random.Generator, stem: Path,
     kinds: Sequence[str] = (),
@@ -108,37 +112,17 @@ def observed(
         seen = seen * Rotation.from_quat(rows[:, [1, 2, 3, 0]])
         path = stem.with_suffix(".attitude.csv")
         if chance.random() < 0.5:
-            values, names, observable = seen.as_quat()[:, [3, 0, 1, 2]], ["w", "x", "y", "z"], "quaternion"
-            unit = ""
+            values, names, observable, unit = seen.as_quat()[:, [3, 0, 1, 2]], "wxyz", "quaternion", ""
         else:
-            values, names, observable = seen.as_euler("ZXZ", degrees=True), ["a", "b", "c"], "euler_angles"
-            unit = 'unit = "deg"\n'
-        found.append(written(path, times, names, values, observable, f'"{sigma!r} rad"', unit))
+            values, names, observable = seen.as_euler("ZXZ", degrees=True), "abc", "euler_angles"
+            unit = 'unit = "deg"'
+        found.append(observations(path, times, values, observable, f'"{sigma!r} rad"', names, unit))
     if "rates" in chosen:
         sigma = size * 10 ** chance.uniform(-4, -2)
         values = rows[:, 4:] + sigma * noise.standard_normal((len(times), 3))
         path = stem.with_suffix(".rates.csv")
-        found.append(written(path, times, ["x", "y", "z"], values, "angular_velocity", repr(sigma), ""))
+        found.append(observations(path, times, values, "angular_velocity", repr(sigma)))
     return "".join(found)
-
-
-def written(
-    path: Path,
-    times: np.ndarray,
-    names: list[str],
-    values: np.ndarray,
-    observable: str,
-    sigma: str,
-    unit: str,
-) -> str:
-    """A file, and its ``[[fit.data]]``."""
-    table = np.column_stack([times, values])
-    np.savetxt(path, table, delimiter=",", header=",".join(["time", *names]), comments="", fmt="%.17g")
-    columns = repr(names).replace("'", '"')
-    return (
-        f'[[fit.data]]\nfile = "{path}"\nobservable = "{observable}"\ncolumns = {columns}\n'
-        f"sigma = {sigma}\n{unit}"
-    )
 
 
 def turned(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:
@@ -153,7 +137,7 @@ def apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.asarray((inverse * Rotation.from_quat(other[[1, 2, 3, 0]])).as_rotvec())
 
 
-def coverage(scenes: int, seed: int, told: Told) -> tuple[np.ndarray, np.ndarray, list[str]]:
+def coverage(scenes: int, seed: int) -> tuple[np.ndarray, np.ndarray, list[str]]:
     """Pulls of all parameters, the chi-squares' cumulative probabilities by scene, and what went wrong."""
     pulls, shares, wrong = [], [], []
     with tempfile.TemporaryDirectory() as folder:
@@ -171,13 +155,8 @@ def coverage(scenes: int, seed: int, told: Told) -> tuple[np.ndarray, np.ndarray
             pull = error / sigmas
             shares.append(float(chi2.cdf(pull @ np.linalg.solve(scaled, pull), len(pull))))
             if (number + 1) % 25 == 0:
-                told(f"{number + 1} of {scenes} scenes")
+                print(f"{number + 1} of {scenes} scenes", flush=True)
     return np.array(pulls), np.array(shares), wrong
-
-
-# --- undetermined directions --------------------------------------------------------------------------------
-
-MOMENTS = [f"body.principal_moments[{i}]" for i in range(3)]
 
 
 def undetermined(number: int, seed: int, folder: Path) -> tuple[str, list[set[str]], list[set[str]]]:
@@ -186,28 +165,26 @@ def undetermined(number: int, seed: int, folder: Path) -> tuple[str, list[set[st
     """
     chance, noise = random.Random(f"{seed} null {number}"), np.random.default_rng([seed, 7, number])
     kind = ("free", "blind", "braked", "top", "vertical")[number % 5]
-    model = Model.drawn(chance)
-    while model.kind != {"blind": "free", "vertical": "top"}.get(kind, kind):
-        model = Model.drawn(chance)
+    model = drawn(chance, {"blind": "free", "vertical": "top"}.get(kind, kind))
     times = np.sort(noise.uniform(0, model.end, 60))
     keys: list[str] = [ATTITUDE, RATES, *MOMENTS]
     seen = ["attitude", "rates"]
     expected: list[set[str]] = [set(MOMENTS)]  # all moments times a number turn a free body alike
-    extra = ""
-    if kind == "blind":  # rates of a free body tell nothing of its attitude
+    if kind in (
+        "blind",
+        "vertical",
+    ):  # rates don't show an attitude, those of a top no turn about the vertical
         keys, seen = [ATTITUDE, RATES, *MOMENTS[:2]], ["rates"]
-        expected = [{f"{ATTITUDE}[{i}]"} for i in range(3)]
+        attitude = [f"{ATTITUDE}[{i}]" for i in range(3)]
+        expected = [{key} for key in attitude] if kind == "blind" else [set(attitude)]
     if kind == "braked":
         keys.append("loads[0].coefficients")
         expected = [{*MOMENTS, *(f"loads[0].coefficients[{i}]" for i in range(3))}]
     if kind == "top":
         keys.append(LOADS["top"])
         expected = [{*MOMENTS, LOADS["top"]}]
-    if kind == "vertical":  # nor do rates of a top tell of turns about the vertical
-        keys, seen = [ATTITUDE, RATES, *MOMENTS[:2]], ["rates"]
-        expected = [{f"{ATTITUDE}[{i}]" for i in range(3)}]
     data = observed(model, times, chance, noise, folder / f"null{number}", seen)
-    text = config_of(model, model) + f"[fit]\nparameters = {keys!r}\n{extra}".replace("'", '"') + data
+    text = config_of(model, model) + f"[fit]\nparameters = {keys!r}\n".replace("'", '"') + data
     found = rigidsim.fit(rigidsim.parse(text))
     named = [set(one.keys) for one in found.undetermined]
     given = {one.key for one in found.parameters if one.sigma is not None}
@@ -216,20 +193,14 @@ def undetermined(number: int, seed: int, folder: Path) -> tuple[str, list[set[st
     return kind, expected, named
 
 
-# --- considered numbers -------------------------------------------------------------------------------------
-
-
 def considered(seed: int, folder: Path) -> float:
     """Largest relative difference of the covariance with a considered load from the formula's."""
     chance, noise = random.Random(f"{seed} consider"), np.random.default_rng([seed, 9])
-    model = Model.drawn(chance)
-    while model.kind != "top":
-        model = Model.drawn(chance)
+    model = drawn(chance, "top")
     times = np.sort(noise.uniform(0, model.end, 40))
     rows = model.rows("DOP853", 3e-14, np.array([0.0, *times]))[1:]
     sigma = 1e-3
-    path = folder / "rates.csv"
-    data = written(path, times, ["x", "y", "z"], rows[:, 4:], "angular_velocity", repr(sigma), "")
+    data = observations(folder / "rates.csv", times, rows[:, 4:], "angular_velocity", repr(sigma))
     known = 0.02 * model.load
     keys = [RATES, *MOMENTS[:2]]
     text = model.config + f"[fit]\nparameters = {keys!r}\n".replace("'", '"')
@@ -264,16 +235,21 @@ def considered(seed: int, folder: Path) -> float:
     return float(np.abs((found.dataset["covariance"].values - expected) / scale).max())
 
 
-def campaign(scenes: int, nulls: int, seed: int, told: Told = print) -> int:
-    """Print what came out; 1 if something failed."""
-    pulls, shares, wrong = coverage(scenes, seed, told)
+@Command
+def campaign(scenes: int = 300, nulls: int = 50, seed: int = 1) -> int:
+    """Print what came out; 1 if something failed.
+
+    Args:
+        nulls: scenes with undetermined directions.
+    """
+    pulls, shares, wrong = coverage(scenes, seed)
     failed = len(wrong)
     for text in wrong:
-        told(f"FAILED {text}")
+        print(f"FAILED {text}")
     if len(shares):
         p = float(kstest(shares, "uniform").pvalue)
         inside = [float((np.abs(pulls) < n).mean()) for n in (1, 2)]
-        told(
+        print(
             f"{len(shares)} scenes, {len(pulls)} parameters: Kolmogorov p = {p:.3f} of chi-squares, "
             f"{100 * inside[0]:.1f} % within one sigma (68.3), {100 * inside[1]:.1f} % within two (95.4), "
             f"largest {np.abs(pulls).max():.2f} sigmas"
@@ -289,22 +265,8 @@ def campaign(scenes: int, nulls: int, seed: int, told: Told = print) -> int:
             good = sorted(map(sorted, expected)) == sorted(map(sorted, named))
             right += good
             if not good:
-                told(f"FAILED undetermined {number} ({kind}): {named}, expected {expected}")
+                print(f"FAILED undetermined {number} ({kind}): {named}, expected {expected}")
         off = considered(seed, Path(folder))
-    told(f"undetermined directions: {right} of {nulls} scenes right")
-    told(f"covariance with a considered load: {off:.1e} from the formula at most")
+    print(f"undetermined directions: {right} of {nulls} scenes right")
+    print(f"covariance with a considered load: {off:.1e} from the formula at most")
     return int(failed > 0 or right < nulls or not off < 1e-6)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the campaign as a command."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--scenes", type=int, default=300)
-    parser.add_argument("--undetermined", type=int, default=50)
-    parser.add_argument("--seed", type=int, default=1)
-    given: Any = parser.parse_args(arguments)
-    return campaign(given.scenes, given.undetermined, given.seed)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

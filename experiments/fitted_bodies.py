@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import rigidsim
 from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Study
+from rigidsim.scene.scene import build_scene
 
 BOOK = """
 name = "book"
@@ -59,20 +61,28 @@ MAS = float(np.deg2rad(1 / 3.6e6))
 MOMENTS = [f"body.principal_moments[{i}]" for i in range(3)]
 
 
-def data(path: Path, observable: str, columns: list[str], sigma: float, more: str = "") -> str:
-    """A ``[[fit.data]]``."""
-    names = ", ".join(f'"{name}"' for name in columns)
-    return (
-        f'[[fit.data]]\nfile = "{path}"\nobservable = "{observable}"\ncolumns = [{names}]\n'
-        f"sigma = {sigma!r}\n{more}\n"
-    )
+def observations(
+    path: Path,
+    times: np.ndarray,
+    values: np.ndarray,
+    observable: str,
+    sigma: str,
+    names: str = "xyz",
+    more: str = "",
+) -> str:
+    """Write a table of observations; the ``[[fit.data]]`` of it.
 
-
-def written(path: Path, times: np.ndarray, values: np.ndarray, names: list[str]) -> Path:
-    """A table of observations."""
-    header = ",".join(["time", *names])
+    Args:
+        sigma: as TOML.
+        names: of the columns, a letter each.
+        more: further keys.
+    """
+    header, columns = ",".join(["time", *names]), '", "'.join(names)
     np.savetxt(path, np.column_stack([times, values]), "%.17g", ",", header=header, comments="")
-    return path
+    return (
+        f'[[fit.data]]\nfile = "{path}"\nobservable = "{observable}"\n'
+        f'columns = ["{columns}"]\nsigma = {sigma}\n{more}\n'
+    )
 
 
 def motion(text: str, times: np.ndarray) -> Any:
@@ -127,8 +137,12 @@ def book(folder: Path) -> tuple[list[Check], Panel]:
     true = motion(BOOK, times)["angular_velocity"].values
     noise = np.random.default_rng(11).standard_normal(true.shape)
     seen = true + BIAS + GYROSCOPE * noise
-    file = written(folder / "gyroscope.csv", times, seen, ["x", "y", "z"])
-    sets = "".join(data(file, f"w{a} + b{a}", [a], GYROSCOPE, 'unit = "rad/s"') for a in "xyz")
+    sets = "".join(
+        observations(
+            folder / f"{a}.csv", times, seen[:, n], f"w{a} + b{a}", repr(GYROSCOPE), a, 'unit = "rad/s"'
+        )
+        for n, a in enumerate("xyz")
+    )
     keys = ["initial.angular_velocity", *MOMENTS[:2], *(f"parameters.b{a}" for a in "xyz")]
     start = BOOK.replace("[13, 20, 25]", "[12.8, 20.3, 25]").replace("[0.6, 9, 0.4]", "[0.65, 8.9, 0.35]")
     fit = f"[fit]\nparameters = {keys}\n".replace("'", '"')
@@ -164,10 +178,9 @@ def satellite(folder: Path) -> tuple[list[Check], Panel]:
         spans = SPANS if name == "with a wheel" else SPANS[-1:]
         for span in spans:
             part = times <= span * ORBIT * (1 + 1e-9)
-            file = written(folder / "attitudes.csv", times[part], seen[part], ["w", "x", "y", "z"])
-            found = rigidsim.fit(
-                rigidsim.parse(text + fit + data(file, "quaternion", ["w", "x", "y", "z"], ATTITUDES))
-            )
+            file = folder / "attitudes.csv"
+            data = observations(file, times[part], seen[part], "quaternion", repr(ATTITUDES), "wxyz")
+            found = rigidsim.fit(rigidsim.parse(text + fit + data))
             sigmas.append([found.sigma(key) or np.nan for key in MOMENTS])
         told[name] = found
         if name == "with a wheel":
@@ -189,8 +202,6 @@ def satellite(folder: Path) -> tuple[list[Check], Panel]:
 
 def _turned(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """A quaternion turned by a small rotation vector in space axes."""
-    from scipy.spatial.transform import Rotation
-
     made = Rotation.from_rotvec(vector) * Rotation.from_quat(quaternion[[1, 2, 3, 0]])
     return np.asarray(made.as_quat()[[3, 0, 1, 2]])
 
@@ -201,13 +212,14 @@ def moon(folder: Path) -> tuple[list[Check], Panel]:
 
     days = np.arange(4.0, 366.0, 4.0)
     matrices = bare.librations("de421", START + days)
-    seen = _quaternions(matrices)
-    file = written(folder / "librations.csv", days * 86400, seen, ["w", "x", "y", "z"])
+    seen = Rotation.from_matrix(matrices).as_quat()[:, [3, 0, 1, 2]]
+    file = folder / "librations.csv"
+    observations(file, days * 86400, seen, "quaternion", "1", "wxyz")
     scene = rigidsim.load(CONFIGS / "kernels" / "moon_since_1969.toml").replace(
         {"time.end": f"{days[-1]:g} day", "output.record": ["quaternion"]}
     )
     table = scene.to_dict()
-    moments = [float(x) for x in _moments(scene)]
+    moments = [float(x) for x in build_scene(scene).body.principal_moments]
     rates = [float(x.split()[0]) / 86400 for x in table["initial"]["angular_velocity"]]
     perturbed = [moments[0] * (1 + 3e-8), moments[1] * (1 - 2e-8), moments[2]]
     keys = ["initial.attitude", "initial.angular_velocity", *MOMENTS[:2]]
@@ -248,19 +260,6 @@ def moon(folder: Path) -> tuple[list[Check], Panel]:
     return checks, Panel("DE421's Moon, fitted: what is left", "years since 1969", "mas", curves)
 
 
-def _moments(scene: Any) -> list[Any]:
-    from rigidsim.scene.scene import build_scene
-
-    return list(build_scene(scene).body.principal_moments)
-
-
-def _quaternions(matrices: np.ndarray) -> np.ndarray:
-    """Quaternions w x y z of matrices from body to space axes."""
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_matrix(matrices).as_quat()[:, [3, 0, 1, 2]])
-
-
 @Study
 def study(full: bool) -> Answer:
     """All four, and their figure."""
@@ -272,7 +271,3 @@ def study(full: bool) -> Answer:
     return checks, Picture(
         "What observations show of real bodies", "ab;cd" if full else "ab;c.", panels, (12, 8.5)
     )
-
-
-if __name__ == "__main__":
-    raise SystemExit(study.main())

@@ -23,7 +23,6 @@ from experiments.measure import crossings
 MOMENTS = (1, 2, 3)
 FLIPS = 3
 PER_UNIT = 50  # samples per 1/p
-COLORS = {"double": "orange", "extended": "green", "quadruple": "blue"}
 CONFIG = """
 name = "flips"
 body.principal_moments = [1, 2, 3]
@@ -67,6 +66,29 @@ def worst(top: FreeTop, reversals: list[Any]) -> Any:
     return max(intervals, key=lambda interval: abs(interval - top.flip))
 
 
+def picture(found: dict[str, list[tuple[int, float, float, float]]]) -> Picture:
+    """Period against offset, and its error."""
+    offsets = np.logspace(-1, -12, 100)
+    curve = [float(free_top([mpmath.mpf(m) for m in MOMENTS], [mpmath.mpf(0), 1, mpmath.mpf(d)]).flip)
+             for d in offsets]  # fmt: skip
+    periods, errors = [Curve(offsets, curve, "2K(k)/p", "grey")], []
+    for (precision, rows), color, marker in zip(
+        found.items(), ("orange", "green", "blue"), "s^o", strict=True
+    ):
+        exponents, values, error, allowed = np.array(rows, dtype=float).T
+        periods.append(Curve(10**-exponents, values, precision, color, marker, 1.7))
+        errors += [Curve(10**-exponents, np.maximum(error, 1e-36), precision, color, marker, 1.7),
+                   Curve(10**-exponents, allowed, "", color, "--", 1)]  # fmt: skip
+    title = "Ten times nearer the separatrix, 2 ln(10)/p longer until the flip: to 1e-12, in enough digits"
+    xlabel, limits = "offset d from the separatrix (rad/s)", {"xlim": (0.3, 3e-13)}
+    return Picture(title, "ab", [
+        Panel("Double precision loses it where d^2 < eps", xlabel, "time between flips (s)", periods, "x",
+              limits=limits),
+        Panel("Error; dashed: what rounding explains, ~ eps / d^2", xlabel, "error (s)", errors, "xy",
+              limits=limits),
+    ], (12, 5.2))  # fmt: skip
+
+
 @Study
 def study(full: bool) -> Answer:
     """Offsets from 1e-1 to 1e-12."""
@@ -100,30 +122,3 @@ def study(full: bool) -> Answer:
                     )  # fmt: skip
         figure = picture(found)
     return checks, figure
-
-
-def picture(found: dict[str, list[tuple[int, float, float, float]]]) -> Picture:
-    """Period against offset, and its error."""
-    offsets = np.logspace(-1, -12, 100)
-    curve = [float(free_top([mpmath.mpf(m) for m in MOMENTS], [mpmath.mpf(0), 1, mpmath.mpf(d)]).flip)
-             for d in offsets]  # fmt: skip
-    periods, errors = [Curve(offsets, curve, "2K(k)/p", "grey")], []
-    for (precision, rows), color, marker in zip(
-        found.items(), ("orange", "green", "blue"), "s^o", strict=True
-    ):
-        exponents, values, error, allowed = np.array(rows, dtype=float).T
-        periods.append(Curve(10**-exponents, values, precision, color, marker, 1.7))
-        errors += [Curve(10**-exponents, np.maximum(error, 1e-36), precision, color, marker, 1.7),
-                   Curve(10**-exponents, allowed, "", color, "--", 1)]  # fmt: skip
-    title = "Ten times nearer the separatrix, 2 ln(10)/p longer until the flip: to 1e-12, in enough digits"
-    xlabel, limits = "offset d from the separatrix (rad/s)", {"xlim": (0.3, 3e-13)}
-    return Picture(title, "ab", [
-        Panel("Double precision loses it where d^2 < eps", xlabel, "time between flips (s)", periods, "x",
-              limits=limits),
-        Panel("Error; dashed: what rounding explains, ~ eps / d^2", xlabel, "error (s)", errors, "xy",
-              limits=limits),
-    ], (12, 5.2))  # fmt: skip
-
-
-if __name__ == "__main__":
-    raise SystemExit(study.main())

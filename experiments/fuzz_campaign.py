@@ -5,10 +5,10 @@
 Every case may end in one of two ways: it is read, or it is refused with one clear message (a RigidsimError).
 A traceback, a hang (``--seconds`` per case), a crash of the process or memory beyond ``--megabytes`` is a
 defect; its case is kept in ``--keep`` and the exit code is 1. Cases run in a child process, which is renewed
-when it dies, one at a time; a case is named by the seed and its number, and ``--only N`` repeats one.
+when it dies, one at a time; a case is named by the seed and its number, and ``--configs 1 --files 0
+--first N`` repeats one.
 """
 
-import argparse
 import contextlib
 import io
 import json
@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments import fuzzing
+from experiments.common import Command
 from rigidsim.errors import ConfigError, RigidsimError
 
 LONGEST_MESSAGE = 20_000
@@ -230,46 +231,45 @@ def _serve(case: Callable[[int], str], numbers: range, seconds: float, megabytes
     os._exit(0)
 
 
-def main() -> int:
-    """The campaign from the command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--configs", type=int, default=2000)
-    parser.add_argument("--files", type=int, default=300)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--seconds", type=float, default=20.0, help="longest time of one case")
-    parser.add_argument("--megabytes", type=int, default=6000, help="address space of the child")
-    parser.add_argument("--only", type=int, help="repeat this case alone")
-    parser.add_argument("--keep", type=Path, help="folder for the defects' tracebacks")
-    arguments = parser.parse_args()
-    settings = {"seconds": arguments.seconds, "megabytes": arguments.megabytes}
+@Command
+def both(
+    configs: int = 2000,
+    files: int = 300,
+    seed: int = 1,
+    first: int = 0,
+    seconds: float = 20.0,
+    megabytes: int = 6000,
+    keep: str = "",
+) -> int:
+    """Both kinds of cases; 1 if there is a defect.
+
+    Args:
+        seconds: longest time of one case.
+        megabytes: address space of the child.
+        keep: folder for the defects' tracebacks.
+    """
     found = 0
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        bases = base_runs(folder / "bases") if arguments.files else []
+        bases = base_runs(folder / "bases") if files else []
         kinds: list[tuple[str, int, Callable[[int], str]]] = [
-            ("config", arguments.configs, lambda n: config_case(n, arguments.seed, folder)),
-            ("file", arguments.files, lambda n: file_case(n, arguments.seed, folder, bases)),
+            ("config", configs, lambda n: config_case(n, seed, folder)),
+            ("file", files, lambda n: file_case(n, seed, folder, bases)),
         ]
         for label, count, case in kinds:
             if not count:
                 continue
-            numbers = range(count) if arguments.only is None else range(arguments.only, arguments.only + 1)
+            numbers = range(first, first + count)
             started = time.monotonic()
-            counts, defects = campaign(case, numbers, label=label, **settings)
+            counts, defects = campaign(case, numbers, seconds=seconds, megabytes=megabytes, label=label)
             peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1000
             print(
-                f"{len(numbers)} {label}s, seed {arguments.seed}: {dict(counts)}, {len(defects)} defects, "
+                f"{len(numbers)} {label}s, seed {seed}: {dict(counts)}, {len(defects)} defects, "
                 f"{time.monotonic() - started:.0f} s, peak memory {peak:.0f} MB"
             )
             found += len(defects)
-            if arguments.keep and defects:
-                arguments.keep.mkdir(parents=True, exist_ok=True)
+            if keep and defects:
+                Path(keep).mkdir(parents=True, exist_ok=True)
                 for number, text in defects.items():
-                    (arguments.keep / f"{label}-{arguments.seed}-{number}.txt").write_text(text)
-    return 1 if found else 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+                    (Path(keep) / f"{label}-{seed}-{number}.txt").write_text(text)
+    return int(found > 0)

@@ -95,14 +95,8 @@ def nutation(result: Result) -> Nutation:
     turned = value_at(time, phi, lows[-1]) - value_at(time, phi, lows[0])  # over whole nutations
     speed = float(np.linalg.norm(result.values("angular_velocity"), axis=1).max())
     period = float((lows[-1] - lows[0]) / (len(lows) - 1))
-    return Nutation(
-        period,
-        float(low),
-        float(high),
-        len(lows) - 1,
-        float(turned / (lows[-1] - lows[0])),
-        round_off(result, speed),
-    )
+    precession = float(turned / (lows[-1] - lows[0]))
+    return Nutation(period, float(low), float(high), len(lows) - 1, precession, round_off(result, speed))
 
 
 REGIMES = {  # the axis' path: body rates that start at its upper turning point, 30 degrees
@@ -225,18 +219,6 @@ def pendulum_checks(full: bool) -> list[Check]:
     return checks
 
 
-@Study
-def study(full: bool) -> Answer:
-    """Every regime; see the module's text."""
-    with mpmath.workdps(40):
-        nutations, paths = nutation_checks(full)
-        precessions = precession_checks(full)
-        sleepers, tilts = sleeping_checks()
-        pendulums = pendulum_checks(full)
-        figure = picture(paths, tilts)
-        return nutations + precessions + sleepers + pendulums, figure
-
-
 def picture(paths: dict[str, Result], tilts: dict[str, Result]) -> Picture:
     """Tilts against time: with the closed form's turning angles, and near the sleeping threshold."""
     curves = []
@@ -257,5 +239,13 @@ def picture(paths: dict[str, Result], tilts: dict[str, Result]) -> Picture:
     ], (12, 5))  # fmt: skip
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool) -> Answer:
+    """Every regime; see the module's text."""
+    with mpmath.workdps(40):
+        nutations, paths = nutation_checks(full)
+        precessions = precession_checks(full)
+        sleepers, tilts = sleeping_checks()
+        pendulums = pendulum_checks(full)
+        figure = picture(paths, tilts)
+        return nutations + precessions + sleepers + pendulums, figure

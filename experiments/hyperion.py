@@ -213,64 +213,6 @@ def e_fold(motion: Motion, state: Resonance) -> float:
     return float(50 / np.polyfit(np.arange(len(largest)), np.log(largest), 1)[0])
 
 
-@Study
-def study(full: bool) -> Answer:
-    """Stability, Lyapunov rates, pictures; see the module's text."""
-    motion = Motion()
-    checks = []
-    shown = {}
-    for name, (k, m, stable) in STATES.items():
-        found = resonances(motion, k, m)
-        for one in found:
-            print(
-                f"p = {name}: theta {np.degrees(one.theta):.0f} deg, w {one.spin:.9f} n, multipliers per "
-                f"revolution: in the plane {one.planar:.6f}, out of it {one.out:.6f}", file=sys.stderr,
-            )  # fmt: skip
-        quiet = [one for one in found if one.planar < 1 + ONE]
-        none = Resonance(np.nan, np.nan, np.nan, np.nan)
-        best = min(quiet, key=lambda one: (round(one.out, 9), -one.theta), default=none)
-        shown[name] = best
-        path = tilts(motion, motion.state(best.theta, best.spin, TILT), 1000)
-        paper = "Wisdom, Peale & Mignard 1984"
-        largest, kind = (STAYS, "absolute") if stable else (LEAVES, "apart")
-        title = f"state {name}, {'' if stable else 'un'}stable: largest tilt in 1000 revolutions"
-        between = f"{paper}; between what both sorts do"
-        checks.append(Check(title, path.max(), 0.0, largest, "deg", between, kind))  # type: ignore[arg-type]
-        if name == WEAK:
-            checks.append(Check(f"state {name}, weakly unstable: e-fold of a tilt of 1e-7 rad",
-                                e_fold(motion, best), 1 / np.log(best.out), 0.02, "revolutions",
-                                "its multiplier, which departs from the paper's verdict; oscillation of the "
-                                "tilt over the fit"))  # fmt: skip
-        checks.append(Check(f"state {name}: largest out-of-plane multiplier", best.out, 1.0, ONE, "1",
-                            f"{paper}{', NOT as there' if name == WEAK else ''}; rounding at a collision",
-                            "absolute" if stable and name != WEAK else "apart"))  # fmt: skip
-    checks.append(
-        Check("synchronous, out-of-plane multiplier per revolution", shown["1"].out, SYNCHRONOUS, 1e-3, "1",
-              "re-computed for the project; 1e-3")
-    )  # fmt: skip
-    tolerance = 0.15 if full else 0.3
-    runs = {"planar": (10000 if full else 3000, (0.0,)), "tumbling": (2000, TILTS if full else (TILT,))}
-    exponents = {}
-    for name, (revolutions, lean) in runs.items():
-        several = []
-        for tilt in lean:
-            state = motion.state(np.pi / 2, 1.0, tilt)
-            one, spectrum = lyapunov(motion, state, revolutions, plane=name == "planar")
-            several.append(one)
-            print(f"{name}, tilt {tilt:g} rad: all rates (n) {np.round(spectrum, 4)}", file=sys.stderr)
-        rate = float(np.mean([one.rate for one in several]))
-        error = float(np.sqrt(np.sum([one.error**2 for one in several]))) / len(several)
-        exponents[name] = Exponent(rate, error, np.mean([one.running for one in several], axis=0))
-        days = PERIOD / (2 * np.pi * rate)
-        print(f"{name}: {rate:.4f} n, s.e. {error:.4f}, e-fold {days:.1f} d", file=sys.stderr)
-        checks.append(
-            Check(f"Lyapunov rate, {name}, {len(lean)} x {revolutions} revolutions", rate, RATES[name],
-                  tolerance, "n", "re-computed (the paper: about 0.1); 15 %, shorter runs 30 %")
-        )  # fmt: skip
-    figure = picture(motion, shown, exponents)
-    return checks, figure
-
-
 def picture(motion: Motion, shown: dict[str, Resonance], exponents: dict[str, Exponent]) -> Picture:
     """Surface of section, loss of attitude, wandering axis, convergence."""
 
@@ -325,5 +267,58 @@ def picture(motion: Motion, shown: dict[str, Resonance], exponents: dict[str, Ex
     ], (12, 9.5))  # fmt: skip
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool) -> Answer:
+    """Stability, Lyapunov rates, pictures; see the module's text."""
+    motion = Motion()
+    checks = []
+    shown = {}
+    for name, (k, m, stable) in STATES.items():
+        found = resonances(motion, k, m)
+        for one in found:
+            print(
+                f"p = {name}: theta {np.degrees(one.theta):.0f} deg, w {one.spin:.9f} n, multipliers per "
+                f"revolution: in the plane {one.planar:.6f}, out of it {one.out:.6f}", file=sys.stderr,
+            )  # fmt: skip
+        quiet = [one for one in found if one.planar < 1 + ONE]
+        none = Resonance(np.nan, np.nan, np.nan, np.nan)
+        best = min(quiet, key=lambda one: (round(one.out, 9), -one.theta), default=none)
+        shown[name] = best
+        path = tilts(motion, motion.state(best.theta, best.spin, TILT), 1000)
+        paper = "Wisdom, Peale & Mignard 1984"
+        largest, kind = (STAYS, "absolute") if stable else (LEAVES, "apart")
+        title = f"state {name}, {'' if stable else 'un'}stable: largest tilt in 1000 revolutions"
+        between = f"{paper}; between what both sorts do"
+        checks.append(Check(title, path.max(), 0.0, largest, "deg", between, kind))  # type: ignore[arg-type]
+        if name == WEAK:
+            checks.append(Check(f"state {name}, weakly unstable: e-fold of a tilt of 1e-7 rad",
+                                e_fold(motion, best), 1 / np.log(best.out), 0.02, "revolutions",
+                                "its multiplier, which departs from the paper's verdict; oscillation of the "
+                                "tilt over the fit"))  # fmt: skip
+        checks.append(Check(f"state {name}: largest out-of-plane multiplier", best.out, 1.0, ONE, "1",
+                            f"{paper}{', NOT as there' if name == WEAK else ''}; rounding at a collision",
+                            "absolute" if stable and name != WEAK else "apart"))  # fmt: skip
+    checks.append(
+        Check("synchronous, out-of-plane multiplier per revolution", shown["1"].out, SYNCHRONOUS, 1e-3, "1",
+              "re-computed for the project; 1e-3")
+    )  # fmt: skip
+    tolerance = 0.15 if full else 0.3
+    runs = {"planar": (10000 if full else 3000, (0.0,)), "tumbling": (2000, TILTS if full else (TILT,))}
+    exponents = {}
+    for name, (revolutions, lean) in runs.items():
+        several = []
+        for tilt in lean:
+            state = motion.state(np.pi / 2, 1.0, tilt)
+            one, spectrum = lyapunov(motion, state, revolutions, plane=name == "planar")
+            several.append(one)
+            print(f"{name}, tilt {tilt:g} rad: all rates (n) {np.round(spectrum, 4)}", file=sys.stderr)
+        rate = float(np.mean([one.rate for one in several]))
+        error = float(np.sqrt(np.sum([one.error**2 for one in several]))) / len(several)
+        exponents[name] = Exponent(rate, error, np.mean([one.running for one in several], axis=0))
+        days = PERIOD / (2 * np.pi * rate)
+        print(f"{name}: {rate:.4f} n, s.e. {error:.4f}, e-fold {days:.1f} d", file=sys.stderr)
+        checks.append(
+            Check(f"Lyapunov rate, {name}, {len(lean)} x {revolutions} revolutions", rate, RATES[name],
+                  tolerance, "n", "re-computed (the paper: about 0.1); 15 %, shorter runs 30 %")
+        )  # fmt: skip
+    return checks, picture(motion, shown, exponents)

@@ -1,20 +1,17 @@
 """How do errors grow over long runs, and what does holding the invariants change?
 
-Question: Brouwer (1937, Astron. J. 46, 149) found that rounding alone makes the energy of an orbit wander
-like t^(1/2) and its phase like t^(3/2). Do energy, angular momentum and attitude of a rigid body follow these
-laws, or does something systematic (a bias of rounding or truncation) make them grow faster?
-Method: a free asymmetric body and a heavy symmetric top, 12 nearby starts for each precision, against the
-closed form in quadruple precision, which is exact at any time. Times are in radians of the fastest rate.
-Lines are fitted to the logarithms of the root mean squares over the starts; the exponents' uncertainty is
-from resampling the starts (bootstrap).
+Brouwer (1937, Astron. J. 46, 149) found that rounding alone makes the energy of an orbit wander like t^(1/2)
+and its phase like t^(3/2). A free asymmetric body and a heavy symmetric top, 12 nearby starts for each
+precision, are compared with the closed form in quadruple precision, which is exact at any time. Times are in
+radians of the fastest rate. Lines are fitted to the logarithms of the root mean squares over the starts; the
+exponents' uncertainty is from resampling the starts (bootstrap).
 
 Tolerances are "auto". At epsilon itself truncation leaves a bias wherever rounding the series' order up gains
 little: in single precision (order 9 for 8.97) the mean energy error of 24 starts was 9 standard errors from
-zero at 1.3e5 rad, in 80 bits (23 for 22.83) that of 16 starts 3.2 at 3e4 rad, and the exponents came out at
-0.61 to 0.66 and 1.63. With an eighth of epsilon (orders 11 and 24) they are 1.7 and 0.2. Double precision (20
-for 19.02) shows none. (tests/solve/test_auto_tolerance.py)
+zero at 1.3e5 rad, in 80 bits (23 for 22.83) that of 16 starts 3.2 at 3e4 rad. With an eighth of epsilon
+(orders 11 and 24) they are 1.7 and 0.2. Double precision (20 for 19.02) shows none.
+(tests/solve/test_auto_tolerance.py)
 
-Run: python -m experiments.long_horizon [--full] [--out DIR]
 Reduced: single to 1e4, double to 1e5 rad, extended to 1e4; --full: 1e5, 1e7 and 1e6 (an hour and a half).
 """
 
@@ -199,36 +196,13 @@ def _curves(data: xarray.Dataset, quantity: str) -> list[Curve]:
     return curves + [Curve(moments, edge, "", color, ":", 0.6) for edge in (low, high)]
 
 
-def markdown(measured: Sequence[xarray.Dataset]) -> str:
-    """The exponents, and the attitude error at the end, as a table."""
-    lines = [
-        "| scene | precision | held | to, rad | energy | momentum | attitude | attitude error there, rad |",
-        "|" + " --- |" * 8,
-    ]
-    for data in measured:
-        fits = [fit(data, quantity) for quantity in QUANTITIES]
-        cells = ["-" if f is None else f"{f.exponent:.2f} ± {f.sigma:.2f}" for f in fits]
-        final = data["error"].sel(quantity="attitude").values[:, -1]
-        quartiles = " to ".join(f"{x:.1e}" for x in np.percentile(final, (25, 75)))
-        lines.append(
-            f"| {data.attrs['body']} | {data.attrs['precision']} | {'yes' if data.attrs['held'] else 'no'} "
-            f"| {data['time'].values[-1]:.0e} | {' | '.join(cells)} | {np.median(final):.1e} ({quartiles}) |"
-        )
-    return "\n".join(lines)
-
-
 @Study
 def long_horizon(full: bool) -> Answer:
-    """Measure, draw, print the exponents."""
+    """Measure, fit, draw."""
     measured = []
     for body in BODIES:
         for precision, horizon in (FULL if full else REDUCED).items():
             for held in (False, True):
                 print(f"{body}, {precision}, {'held' if held else 'plain'}", file=sys.stderr, flush=True)
                 measured.append(measure(body, precision, held, horizon))
-    print(markdown(measured))
     return checks(measured), picture(measured)
-
-
-if __name__ == "__main__":
-    raise SystemExit(long_horizon.main())

@@ -34,26 +34,6 @@ def run(*settings: str) -> tuple[np.ndarray, Result]:
     return START + result.values("time") / 86400, result
 
 
-@Study
-def study(full: bool) -> Answer:
-    """Precession, amplitudes, amplifications."""
-    days, result = run()
-    rigid = mars.fit(days, result.values("figure_axis"), (FREE,))
-    _, fluid = run(f"body.core={{moment={CORE.moment!r}, flattening={CORE.flattening!r}}}")
-    core = mars.fit(days, fluid.values("figure_axis"), (FREE, CORE.free_nutation(SPIN)))
-    scale = factor(rigid)
-    figure = picture(days, result, rigid, core, scale)
-    return [
-        Check("precession, with the geodetic one", rigid.rates[0] + mars.GEODETIC, mars.PRECESSION, 0.02,
-              "mas/yr", "Konopliv et al. 2016; H is fitted to it, in six digits", "absolute"),
-        Check("C/(M R^2) = J2/H", POLAR, 0.36367, 1e-4, "1", "Baland et al. 2020; its error", "absolute"),
-        *nutations(rigid, scale),
-        Check("precession that the published series goes with", -rigid.rates[0] / scale, 7576.0, 35.0,
-              "mas/yr", "Folkner et al. 1997; its error", "absolute"),
-        *amplifications(rigid, core),
-    ], figure  # fmt: skip
-
-
 def factor(rigid: mars.Nutation) -> float:
     """All amplitudes over the published ones, by least squares."""
     harmonics = range(1, mars.HARMONICS + 1)
@@ -131,5 +111,20 @@ def picture(
     ], (14, 5.2))  # fmt: skip
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool) -> Answer:
+    """Precession, amplitudes, amplifications."""
+    days, result = run()
+    rigid = mars.fit(days, result.values("figure_axis"), (FREE,))
+    _, fluid = run(f"body.core={{moment={CORE.moment!r}, flattening={CORE.flattening!r}}}")
+    core = mars.fit(days, fluid.values("figure_axis"), (FREE, CORE.free_nutation(SPIN)))
+    scale = factor(rigid)
+    return [
+        Check("precession, with the geodetic one", rigid.rates[0] + mars.GEODETIC, mars.PRECESSION, 0.02,
+              "mas/yr", "Konopliv et al. 2016; H is fitted to it, in six digits", "absolute"),
+        Check("C/(M R^2) = J2/H", POLAR, 0.36367, 1e-4, "1", "Baland et al. 2020; its error", "absolute"),
+        *nutations(rigid, scale),
+        Check("precession that the published series goes with", -rigid.rates[0] / scale, 7576.0, 35.0,
+              "mas/yr", "Folkner et al. 1997; its error", "absolute"),
+        *amplifications(rigid, core),
+    ], picture(days, result, rigid, core, scale)  # fmt: skip

@@ -1,4 +1,4 @@
-"""Measuring: rates of angles and lines of spectra, crossings between samples, attitudes as matrices."""
+"""Measuring: rates of angles, crossings between samples, attitudes as matrices."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -17,47 +17,6 @@ def phase_rate(time: np.ndarray, angle: np.ndarray) -> float:
     phase = np.unwrap(angle)
     centred = time - time.mean()
     return float(centred @ (phase - phase.mean()) / (centred @ centred))
-
-
-def bump(count: int) -> np.ndarray:
-    """The smooth window exp(-1 / (x (1 - x))) at the middles of ``count`` intervals, of sum 1."""
-    x = (np.arange(count) + 0.5) / count
-    window = np.exp(-1 / (x * (1 - x)))
-    return window / window.sum()
-
-
-def mean_rate(time: np.ndarray, angle: np.ndarray) -> float:
-    """Mean rate (rad/s) of an angle that grows unevenly, quasi-periodically.
-
-    A weighted Birkhoff average (Das, Saiki, Sander & Yorke 2017, Nonlinearity 30, 4111): with a smooth
-    window the periodic parts average out faster than any power of the length, where the plain mean keeps
-    an error of amplitude / duration. Equal spacing; some tens of periods give ten digits.
-    """
-    increments = np.diff(np.unwrap(angle))
-    spacing = (time[-1] - time[0]) / (len(time) - 1)
-    return float(bump(len(increments)) @ increments / spacing)
-
-
-def spectral_rate(time: np.ndarray, signal: np.ndarray, guess: float) -> float:
-    """Frequency (rad/s) of the spectral line of a complex signal next to ``guess``.
-
-    The maximum of the windowed Fourier integral, refined by Newton's method on the derivative of
-    abs(F)^2 (Laskar 1990); the window's side lobes fall off faster than any power, so that other lines
-    some tens of widths 2 pi / duration away don't move it.
-    """
-    t = time - time.mean()
-    weighted = bump(len(time)) * signal
-    rate = guess
-    for _ in range(50):
-        turned = weighted * np.exp(-1j * rate * t)
-        f, f1, f2 = turned.sum(), (-1j * t * turned).sum(), (-t * t * turned).sum()
-        slope = (f.conjugate() * f1).real
-        curvature = (f.conjugate() * f2).real + abs(f1) ** 2
-        step = slope / curvature
-        rate -= step
-        if abs(step) < 1e-15 * abs(rate):
-            break
-    return float(rate)
 
 
 class Interpolant:

@@ -43,6 +43,38 @@ def free_period(ratio: float) -> float:
     return 87.9691 / math.sqrt(3 * ratio * (7 * e / 2 - 123 * e**3 / 16 + 489 * e**5 / 128)) / mercury.YEAR
 
 
+def picture(days: np.ndarray, turned: np.ndarray, real: mercury.Libration) -> Picture:
+    """A few orbits, 150 years, and amplitudes by the period of the free libration."""
+    rest = turned / mercury.ARCSEC - np.polyval(np.polyfit(days, turned / mercury.ARCSEC, 1), days)
+    m, few = mercury.anomaly(days), slice(0, 132)
+    annual, observed = (
+        sum(a * np.sin((k + 1) * m) for k, a in enumerate(lines)) for lines in (real.annual, IAU)
+    )
+    slow, span, years = rest - annual, days[few] - days[0], 2000 + days / mercury.YEAR
+    period = np.linspace(10, 20, 2001)
+    resonance = [Curve(period, real.annual[0] * (real.period / period) ** 2, "88 days", "grey", width=1),
+                 Curve(real.period, real.annual[0], "", "grey", "o")]  # fmt: skip
+    for line, color, name in ((11.862, "red", "Jupiter, 11.86 y"), (5.663, "blue", "Venus, 5.66 y"),
+                              (14.73, "orange", "Saturn, 14.73 y")):  # fmt: skip
+        push = abs(real.forced[line] * ((real.period / line) ** 2 - 1))
+        amplitude = push / np.maximum(np.abs((period / line) ** 2 - 1), 1e-6)
+        resonance += [Curve(period, amplitude, name, color, width=1),
+                      Curve(real.period, real.forced[line], "", color, "o")]  # fmt: skip
+    title = "Mercury's librations: 38 arcsec each year, and as much again with Jupiter"
+    return Picture(title, "abc", [
+        Panel("Libration in longitude, three years of Mercury", "days", "arcsec", [
+            Curve(span, annual[few] + slow[few] - slow[few].mean(), "run"),
+            Curve(span, observed[few], "the IAU's lines", "orange", "--", 1),
+        ], limits={"ylim": (-48, 62)}, legend="upper right"),
+        Panel("150 years: Jupiter's line of 11.86 years", "", "arcsec", [
+            Curve(years, rest, "all", "grey", width=0.2),
+            Curve(years, slow, "without that of 88 days", "red"),
+        ], limits={"ylim": (-100, 135)}, legend="upper right"),
+        Panel("Near resonance (dots: the run)", "period of the free libration, yr", "amplitude, arcsec",
+              resonance, "y", limits={"ylim": (0.3, 1000)}, legend="upper right"),
+    ], (14, 5.0))  # fmt: skip
+
+
 @Study
 def study(full: bool) -> Answer:
     """Lines of three runs."""
@@ -80,41 +112,4 @@ def study(full: bool) -> Answer:
         Check("the same by the formula", loose.period, free_period(4e-5 / 0.34), 1e-3, "yr",
               "first order; the eccentricity changes"),
     ]  # fmt: skip
-    figure = picture(days, turned, real)
-    return checks, figure
-
-
-def picture(days: np.ndarray, turned: np.ndarray, real: mercury.Libration) -> Picture:
-    """A few orbits, 150 years, and amplitudes by the period of the free libration."""
-    rest = turned / mercury.ARCSEC - np.polyval(np.polyfit(days, turned / mercury.ARCSEC, 1), days)
-    m, few = mercury.anomaly(days), slice(0, 132)
-    annual, observed = (
-        sum(a * np.sin((k + 1) * m) for k, a in enumerate(lines)) for lines in (real.annual, IAU)
-    )
-    slow, span, years = rest - annual, days[few] - days[0], 2000 + days / mercury.YEAR
-    period = np.linspace(10, 20, 2001)
-    resonance = [Curve(period, real.annual[0] * (real.period / period) ** 2, "88 days", "grey", width=1),
-                 Curve(real.period, real.annual[0], "", "grey", "o")]  # fmt: skip
-    for line, color, name in ((11.862, "red", "Jupiter, 11.86 y"), (5.663, "blue", "Venus, 5.66 y"),
-                              (14.73, "orange", "Saturn, 14.73 y")):  # fmt: skip
-        push = abs(real.forced[line] * ((real.period / line) ** 2 - 1))
-        amplitude = push / np.maximum(np.abs((period / line) ** 2 - 1), 1e-6)
-        resonance += [Curve(period, amplitude, name, color, width=1),
-                      Curve(real.period, real.forced[line], "", color, "o")]  # fmt: skip
-    title = "Mercury's librations: 38 arcsec each year, and as much again with Jupiter"
-    return Picture(title, "abc", [
-        Panel("Libration in longitude, three years of Mercury", "days", "arcsec", [
-            Curve(span, annual[few] + slow[few] - slow[few].mean(), "run"),
-            Curve(span, observed[few], "the IAU's lines", "orange", "--", 1),
-        ], limits={"ylim": (-48, 62)}, legend="upper right"),
-        Panel("150 years: Jupiter's line of 11.86 years", "", "arcsec", [
-            Curve(years, rest, "all", "grey", width=0.2),
-            Curve(years, slow, "without that of 88 days", "red"),
-        ], limits={"ylim": (-100, 135)}, legend="upper right"),
-        Panel("Near resonance (dots: the run)", "period of the free libration, yr", "amplitude, arcsec",
-              resonance, "y", limits={"ylim": (0.3, 1000)}, legend="upper right"),
-    ], (14, 5.0))  # fmt: skip
-
-
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+    return checks, picture(days, turned, real)

@@ -1,25 +1,21 @@
 """At equal attitude error, what do rigidsim, bare heyoka and other integrators cost?
 
-Question: a free asymmetric top, a heavy symmetric top and a tumbling satellite under gravity gradient, over
-about 140 and 9000 rad: how many CPU seconds of integration for an attitude error of 1e-6, 1e-9, 1e-12 rad at
-the end, as a ratio to bare heyoka at its best setting?
-
-Method: each peer in fresh processes, in turn, ``--repeats`` times; per setting the fastest of several calls
-in a process, the median over processes; imports and compilation apart. The error is the angle between the
-final attitude and that of 128-bit arithmetic (the tests hold that against closed forms). The cost at an error
-is read off a peer's points: of all its settings the cheapest, interpolated in the logarithms. A peer that
-isn't installed is left out with a message.
+A free asymmetric top, a heavy symmetric top and a tumbling satellite under gravity gradient, over about 140
+and 9000 rad. Each peer runs in fresh processes, in turn; per setting the fastest of several calls in a
+process, the median over processes; imports and compilation apart. The error is the angle between the final
+attitude and that of 128-bit arithmetic. The cost at an error is that of the cheapest of a peer's settings,
+interpolated in the logarithms, as a ratio to bare heyoka at its best. A peer that isn't installed is left out
+with a message.
 
 Run: python -m experiments.peer_comparison [--repeats 3] [--full] [--peers heyoka,rigidsim,...]
 """
 
-import argparse
 import statistics
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.common import BLUE, DEFAULT_OUT, GREY, RED, new_figure, save, tidy
+from experiments.common import BLUE, DEFAULT_OUT, GREY, RED, Command, chosen, new_figure, save, tidy
 from experiments.peers import ADAPTERS
 from experiments.peers.campaign import BARE, OURS, Measured, measure
 from experiments.peers.curves import Point, cost_at, frontier
@@ -44,7 +40,6 @@ _STYLES = {
     "rigidsim, Euler": (BLUE, ":", "X", 3),
     "numba DOP853": (RED, "-", "o", 3.5),
     "scipy DOP853, numba": (GREY, "-", "s", 3),
-    "scipy DOP853, Python": (GREY, ":", "o", 3),
     "scipy LSODA": (GREY, "--", "^", 3),
     "MuJoCo RK4": ("#a6761d", "-", "o", 3.5),
     "MuJoCo implicit": ("#a6761d", ":", "s", 3),
@@ -72,26 +67,6 @@ def _ratio(cost: float | None, bare: float | None) -> str:
     if cost is None:
         return "–"
     return f"({1e3 * cost:.3g} ms)" if bare is None else f"{cost / bare:.3g}"
-
-
-def settings(measured: Measured, cases: Sequence[tuple[str, float]]) -> list[str]:
-    """Markdown: each setting's most accurate point, what it costs, and what comes before it."""
-    lines = ["| scene, end | way | best error, rad | CPU ms | whole call, ms | compile, s |"]
-    lines.append("| --- " * 6 + "|")
-    for scene, end in cases:
-        for peer in ADAPTERS:
-            points = measured.of(scene, end, peer)
-            for title in dict.fromkeys(p.title for p in points):
-                curve = frontier([p for p in points if p.title == title])
-                if not curve:
-                    continue
-                best = curve[-1]
-                whole, compiled = statistics.median(best.whole), max(max(p.prepare) for p in curve)
-                lines.append(
-                    f"| {scene}, {end:g} s | {title} | {best.error:.1e} | {1e3 * best.cost:.3g} "
-                    f"| {1e3 * whole:.3g} | {compiled:.2g} |"
-                )
-    return lines
 
 
 def draw(measured: Measured, cases: Sequence[tuple[str, float]], out: Path) -> Path:
@@ -143,48 +118,31 @@ def _curves(panel: Any, points: list[Point], peer: str, handles: dict[str, Any])
             handles.setdefault(title, handle)
 
 
-def arguments_of(argv: Sequence[str] | None) -> argparse.Namespace:
-    """The command line."""
-    parser = argparse.ArgumentParser(
-        prog=f"python -m experiments.{NAME}", description=__doc__.splitlines()[0]
-    )
-    parser.add_argument("--out", type=Path, default=DEFAULT_OUT, help="folder of the figure")
-    parser.add_argument("--repeats", type=int, default=3, help="fresh processes per peer")
-    parser.add_argument("--full", action="store_true", help="every setting; else every third")
-    parser.add_argument("--short", action="store_true", help="short horizons alone")
-    parser.add_argument("--scenes", default=",".join(SCENES), help="default: %(default)s")
-    parser.add_argument("--peers", default=",".join(ADAPTERS), help="default: %(default)s")
-    parser.add_argument("--cap", type=float, default=10.0, help="CPU seconds after which a curve ends")
-    arguments = parser.parse_args(argv)
-    for option, known in (("peers", ADAPTERS), ("scenes", SCENES)):
-        chosen = getattr(arguments, option).split(",")
-        wrong = [name for name in chosen if name not in known]
-        if wrong:
-            parser.error(f"--{option}: given {', '.join(wrong)}; known: {', '.join(known)}")
-        setattr(arguments, option, chosen)
-    return arguments
+@Command
+def campaign(
+    out: Path = DEFAULT_OUT,
+    repeats: int = 3,
+    full: bool = False,
+    short: bool = False,
+    scenes: str = "",
+    peers: str = "",
+    cap: float = 10.0,
+) -> int:
+    """Measure, print the tables, draw the figure; 1 if the bare script itself could not be measured.
 
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Measure, print the tables, draw the figure; 1 if the bare script itself could not be measured."""
-    arguments = arguments_of(argv)
-    ends = 1 if arguments.short else 2
-    cases = [(name, end) for name in arguments.scenes for end in SCENES[name].ends[:ends]]
-    measured = measure(
-        arguments.peers,
-        cases,
-        repeats=arguments.repeats,
-        stride=1 if arguments.full else 3,
-        fill=0.05,
-        cap=arguments.cap,
-    )
-    print("\n".join([*rows(measured, cases), "", *settings(measured, cases), ""]))
+    Args:
+        repeats: fresh processes per peer.
+        full: every setting; else every third.
+        short: short horizons alone.
+        scenes, peers: names, all by default.
+        cap: CPU seconds after which a curve ends.
+    """
+    asked = chosen(peers, ADAPTERS)
+    cases = [(name, end) for name in chosen(scenes, SCENES) for end in SCENES[name].ends[: 1 if short else 2]]
+    measured = measure(asked, cases, repeats=repeats, stride=1 if full else 3, fill=0.05, cap=cap)
+    print("\n".join([*rows(measured, cases), ""]))
     for peer, seconds in measured.imports.items():
         print(f"import of {peer}: {statistics.median(seconds):.2f} CPU s")
     print("\n".join(measured.notes))
-    print(f"figure: {draw(measured, cases, arguments.out)}")
-    return int(BARE in arguments.peers and BARE not in measured.imports)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+    print(f"figure: {draw(measured, cases, out)}")
+    return int(BARE in asked and BARE not in measured.imports)

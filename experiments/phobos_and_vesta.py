@@ -62,37 +62,6 @@ def vesta(polar: float = 0.4) -> tuple[Result, float, float, float]:
     return result, float(node[1]) * YEAR / MAS / 1000, float(tilt[0]), math.hypot(*tilt[5:7]) / MAS
 
 
-@Study
-def study(full: bool) -> Answer:
-    """Both bodies."""
-    moon, swing, loose = phobos()
-    rock, rate, tilt, nutation = vesta()
-    lighter, heavier = vesta(0.38)[3], vesta(0.42)[3]
-    formula = 2 * ECCENTRICITY / (1 - (ANOMALISTIC / free()) ** 2)
-    h = J2 / 0.4
-    secular = -1.5 * ORBIT**2 / SPIN * h * math.cos(tilt) * (1 - FLAT**2) ** -1.5 * YEAR / MAS / 1000
-    half = 0.75 * ORBIT / SPIN * h * math.sin(tilt) * (1 - 2.5 * FLAT**2) / MAS
-    figure = picture(moon, rock, swing, nutation)
-    abstract = "Rambaux 2013, abstract"
-    return [
-        Check("Phobos, once in an orbit", -swing, 1.1, 0.05, "deg", "Rambaux et al. 2012; one digit",
-              "absolute"),
-        Check("Phobos, beside what is observed", -swing, 1.143, 0.06, "deg",
-              "Archinal et al. 2018; the body is taken as homogeneous", "absolute"),
-        Check("Phobos, by the formula", swing, math.degrees(formula), 0.01, "deg",
-              "first order in e and in the libration", "absolute"),
-        Check("Phobos' free libration left by its start", loose, 0.0, 0.05, "deg", "none was meant",
-              "absolute"),
-        Check("Vesta, half-yearly nutation in obliquity", nutation, 2000.0, 150.0, "mas",
-              f"{abstract}: about; the polar moment is open by 5 %", "absolute"),
-        Check("Vesta, more of it with 0.38 than with 0.42", lighter - heavier, 200.0, 20.0, "mas",
-              f"{abstract}: of the order of", "absolute"),
-        Check("Vesta, the nutation by the formula", nutation, half, 0.005, "mas", "first order; e^4, n/w"),
-        Check("Vesta's precession by the formula", rate, secular, 0.001, "arcsec/yr",
-              "average; the nutations' squares, and that 22 years are no whole number of cycles"),
-    ], figure  # fmt: skip
-
-
 def picture(moon: Result, rock: Result, swing: float, nutation: float) -> Picture:
     """Phobos towards Mars and about its mean rotation; Vesta's obliquity and node."""
     days = moon.values("time")[:401] / DAY
@@ -115,5 +84,31 @@ def picture(moon: Result, rock: Result, swing: float, nutation: float) -> Pictur
     ], (13, 5.0))  # fmt: skip
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool) -> Answer:
+    """Both bodies."""
+    moon, swing, loose = phobos()
+    rock, rate, tilt, nutation = vesta()
+    lighter, heavier = vesta(0.38)[3], vesta(0.42)[3]
+    formula = 2 * ECCENTRICITY / (1 - (ANOMALISTIC / free()) ** 2)
+    h = J2 / 0.4
+    secular = -1.5 * ORBIT**2 / SPIN * h * math.cos(tilt) * (1 - FLAT**2) ** -1.5 * YEAR / MAS / 1000
+    half = 0.75 * ORBIT / SPIN * h * math.sin(tilt) * (1 - 2.5 * FLAT**2) / MAS
+    abstract = "Rambaux 2013, abstract"
+    return [
+        Check("Phobos, once in an orbit", -swing, 1.1, 0.05, "deg", "Rambaux et al. 2012; one digit",
+              "absolute"),
+        Check("Phobos, beside what is observed", -swing, 1.143, 0.06, "deg",
+              "Archinal et al. 2018; the body is taken as homogeneous", "absolute"),
+        Check("Phobos, by the formula", swing, math.degrees(formula), 0.01, "deg",
+              "first order in e and in the libration", "absolute"),
+        Check("Phobos' free libration left by its start", loose, 0.0, 0.05, "deg", "none was meant",
+              "absolute"),
+        Check("Vesta, half-yearly nutation in obliquity", nutation, 2000.0, 150.0, "mas",
+              f"{abstract}: about; the polar moment is open by 5 %", "absolute"),
+        Check("Vesta, more of it with 0.38 than with 0.42", lighter - heavier, 200.0, 20.0, "mas",
+              f"{abstract}: of the order of", "absolute"),
+        Check("Vesta, the nutation by the formula", nutation, half, 0.005, "mas", "first order; e^4, n/w"),
+        Check("Vesta's precession by the formula", rate, secular, 0.001, "arcsec/yr",
+              "average; the nutations' squares, and that 22 years are no whole number of cycles"),
+    ], picture(moon, rock, swing, nutation)  # fmt: skip

@@ -8,7 +8,6 @@ digit of 6798.38 d. The real Earth (IAU 2000B) must differ where its fluid core 
 lines.
 """
 
-import sys
 from typing import Any
 
 import mpmath
@@ -106,21 +105,6 @@ def period(name: str) -> float:
     }[name]  # fmt: skip
 
 
-@Study
-def study(full: bool) -> Answer:
-    """Daily, every 20 days, and each half synodic month."""
-    daily = simulate(config(200, "1" if full else "4")).dataset
-    found = rigidsim.analyse(daily, lines=30)
-    thin = rigidsim.analyse(daily.isel(time=slice(None, None, 20 if full else 5)), lines=30)
-    synodic = 1 / (1 / mpmath.mpf(SIDEREAL_MONTH) - 1 / mpmath.mpf(SIDEREAL_YEAR))
-    folded = simulate(config(60, mpmath.nstr(synodic / 2, 20))).dataset
-    blind = rigidsim.analyse(folded, ["node_longitude.figure"], lines=12)
-    checks = precession(found) + nutation(found) + unfolding(found, thin, blind)
-    print(listing(found), file=sys.stderr)
-    figure = picture(found, thin)
-    return checks, figure
-
-
 def precession(found: Any) -> list[Check]:
     """The secular rate, and what its error claims."""
     signal = found["node_longitude.figure"]
@@ -136,38 +120,23 @@ def nutation(found: Any) -> list[Check]:
     """The four largest terms in longitude and obliquity."""
     checks = []
     rigid = "REN-2000 as quoted; perturbations of the orbits are left out"
-    for name, (real_longitude, real_obliquity) in REAL.items():
+    for name, real in REAL.items():
         along, across = (line_of(found, s, name) for s in ("node_longitude.figure", "obliquity.figure"))
-        a, b = float(along.amplitude) / ARCSEC, float(across.amplitude) / ARCSEC
-        checks.append(
-            Check(
-                f"{name}: period",
-                along.period / DAY,
-                period(name),
-                1e-6 if name != "182.6 d" else 1e-5,
-                "d",
-                "the term's argument; lines within a bin",
-            )
-        )
+        sizes = [float(x.amplitude) / ARCSEC for x in (along, across)]
+        source, allowed = "the term's argument; lines within a bin", 1e-6 if name != "182.6 d" else 1e-5
+        checks.append(Check(f"{name}: period", along.period / DAY, period(name), allowed, "d", source))
         if name in RIGID:
-            checks.append(Check(f"{name}: longitude, rigid", a, RIGID[name], 1e-2, "arcsec", rigid))
-        if name in ("182.6 d", "13.66 d"):
-            for what, size, real in (("longitude", a, real_longitude), ("obliquity", b, real_obliquity)):
-                checks.append(
-                    Check(f"{name}: {what}, real Earth", size, real, 0.015 * real, "arcsec",
-                          "IAU 2000B; core and mantle yield", "apart")
-                )  # fmt: skip
-        if name == "9.3 yr":
-            for what, size, real in (("longitude", a, real_longitude), ("obliquity", b, real_obliquity)):
-                checks.append(
-                    Check(f"{name}: {what}", size, real, 1e-2, "arcsec", "IAU 2000B; slow: all alike")
-                )
+            checks.append(Check(f"{name}: longitude, rigid", sizes[0], RIGID[name], 1e-2, "arcsec", rigid))
+        for what, size, published in zip(("longitude", "obliquity"), sizes, real, strict=True):
+            if name in ("182.6 d", "13.66 d"):
+                title, source = f"{name}: {what}, real Earth", "IAU 2000B; core and mantle yield"
+                checks.append(Check(title, size, published, 0.015 * published, "arcsec", source, "apart"))
+            if name == "9.3 yr":
+                source = "IAU 2000B; slow: all alike"
+                checks.append(Check(f"{name}: {what}", size, published, 1e-2, "arcsec", source))
         if name == "18.6 yr":
-            checks.append(
-                Check(
-                    "18.6 yr: obliquity, rigid", b, 9.2022, 5e-3, "arcsec", "first order; what it leaves out"
-                )
-            )
+            source = "first order; what it leaves out"
+            checks.append(Check("18.6 yr: obliquity, rigid", sizes[1], 9.2022, 5e-3, "arcsec", source))
     return checks
 
 
@@ -192,20 +161,6 @@ def unfolding(found: Any, thin: Any, blind: Any) -> list[Check]:
     return checks
 
 
-def listing(found: Any) -> str:
-    """The four terms beside the published ones, as Markdown."""
-    rows = ["| term | argument | longitude, arcsec | rigid | real | obliquity, arcsec | real |",
-            "| --- | --- | --- | --- | --- | --- | --- |"]  # fmt: skip
-    for name, (real_longitude, real_obliquity) in REAL.items():
-        along, across = (line_of(found, s, name) for s in ("node_longitude.figure", "obliquity.figure"))
-        rows.append(
-            f"| {along.period / DAY:.4f} d | {along.label.text} | {float(along.amplitude) / ARCSEC:.4f} | "
-            f"{RIGID.get(name, '')} | {real_longitude:.4f} | "
-            f"{float(across.amplitude) / ARCSEC:.4f} | {real_obliquity:.4f} |"
-        )
-    return "\n".join(rows)
-
-
 def picture(found: Any, thin: Any) -> Picture:
     """The spectrum of the longitude with its lines, from dense samples and from 20-day ones."""
 
@@ -218,13 +173,9 @@ def picture(found: Any, thin: Any) -> Picture:
             taken: list[tuple[float, float]] = []
             for line in signal.lines:
                 x, y = float(line.frequency) * turns, float(line.amplitude) / ARCSEC
-                color = (
-                    COLORS["red"]
-                    if line.unfolded
-                    else "grey"
-                    if line.ambiguous or not line.label.text
-                    else "blue"
-                )
+                color = COLORS["red"] if line.unfolded else "blue"
+                if line.ambiguous or not line.label.text:
+                    color = "grey"
                 axes.vlines(x, 1e-6, y, color=color, linewidth=1.4)
                 room = all(abs(np.log10(x / a)) > 0.14 or abs(np.log10(y / b)) > 0.9 for a, b in taken)
                 if y > 3e-2 and room:
@@ -247,5 +198,14 @@ def picture(found: Any, thin: Any) -> Picture:
     return Picture(title, "a;b", panels, (12, 7.4))
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool) -> Answer:
+    """Daily, every 20 days, and each half synodic month."""
+    daily = simulate(config(200, "1" if full else "4")).dataset
+    found = rigidsim.analyse(daily, lines=30)
+    thin = rigidsim.analyse(daily.isel(time=slice(None, None, 20 if full else 5)), lines=30)
+    synodic = 1 / (1 / mpmath.mpf(SIDEREAL_MONTH) - 1 / mpmath.mpf(SIDEREAL_YEAR))
+    folded = simulate(config(60, mpmath.nstr(synodic / 2, 20))).dataset
+    blind = rigidsim.analyse(folded, ["node_longitude.figure"], lines=12)
+    checks = precession(found) + nutation(found) + unfolding(found, thin, blind)
+    return checks, picture(found, thin)

@@ -95,7 +95,3 @@ def tradeoff(full: bool) -> Answer:
         panels.append(Panel(title, "CPU time over the default's", "largest attitude error, rad", curves,
                             log="xy"))  # fmt: skip
     return checks, Picture("What accuracy costs: attitude error against CPU time", "abc;de.", panels, (15, 9))
-
-
-if __name__ == "__main__":
-    raise SystemExit(tradeoff.main())

@@ -105,6 +105,19 @@ class Draw:
         """``[[loads]]``, with its other keys as they stand."""
         self.more += ["[[loads]]", f'kind = "{kind}"', *lines]
 
+    def source(self, axis: float, motion: float, eccentricity: float, **elements: float) -> None:
+        """A gravity gradient along an orbit: semi-major axis, mean motion, and further elements, SI."""
+        strength = f"gravitational_parameter = {motion**2 * axis**3!r}"
+        self.load("gravity_gradient", strength, orbit(axis, eccentricity=eccentricity, **elements))
+
+    def fly(
+        self, rates: Vector, distance: float, speed: float, tilt: float, strength: float, *lines: str
+    ) -> None:
+        """Start at right angles to the direction of an attractor; in units."""
+        self.start(rates, position=[distance, 0, 0], velocity=across(speed, tilt))
+        scaled = strength * self.length**3 / self.time**2
+        self.load("central_gravity", f"gravitational_parameter = {scaled!r}", *lines)
+
     def gravity(self, strength: float) -> None:
         """Such that mass times acceleration times a unit of length is the strength."""
         down = [0.0, 0.0, -strength * self.length / self.time**2]
@@ -113,6 +126,17 @@ class Draw:
     def sometimes(self, chance: float) -> bool:
         """True with this chance."""
         return bool(self.random.random() < chance)
+
+
+def orbit(axis: float, **elements: float) -> str:
+    """``orbit`` of a load."""
+    given = {"semi_major_axis": axis, **elements}
+    return f"orbit = {{{', '.join(f'{name} = {value!r}' for name, value in given.items())}}}"
+
+
+def across(speed: float, tilt: float) -> list[float]:
+    """A velocity at right angles to the x axis."""
+    return [0, speed * math.cos(tilt), speed * math.sin(tilt)]
 
 
 def _symmetric(draw: Draw) -> None:
@@ -174,29 +198,22 @@ def _fixed_source(draw: Draw) -> None:
     )
 
 
-def _orbit(draw: Draw, eccentricity: float) -> None:
+def _on_orbit(draw: Draw, eccentricity: float) -> None:
     draw.horizon = 1e3
     draw.body(draw.moments(), turned=draw.sometimes(0.3))
     draw.start(draw.direction() * draw.between(0.5, 1))
     axis = 1e3 * draw.length
     motion = draw.between(0.05, 0.4) / draw.time
-    angles = ", ".join(
-        f"{name} = {draw.between(0, 3)!r}"
-        for name in ("inclination", "ascending_node", "periapsis", "mean_anomaly")
-    )
-    draw.load(
-        "gravity_gradient",
-        f"gravitational_parameter = {motion**2 * axis**3!r}",
-        f"orbit = {{semi_major_axis = {axis!r}, eccentricity = {eccentricity!r}, {angles}}}",
-    )
+    names = ("inclination", "ascending_node", "periapsis", "mean_anomaly")
+    draw.source(axis, motion, eccentricity, **{name: draw.between(0, 3) for name in names})
 
 
 def _circular_orbit(draw: Draw) -> None:
-    _orbit(draw, 0.0)
+    _on_orbit(draw, 0.0)
 
 
 def _eccentric_orbit(draw: Draw) -> None:
-    _orbit(draw, draw.between(0.01, 0.4))
+    _on_orbit(draw, draw.between(0.01, 0.4))
 
 
 def _central_gravity(draw: Draw) -> None:
@@ -205,13 +222,7 @@ def _central_gravity(draw: Draw) -> None:
     distance, motion = draw.decades(1.5, 3), draw.between(0.05, 0.4)
     speed = motion * distance * draw.between(0.9, 1.1)
     tilt = draw.between(0, 3)
-    draw.start(
-        draw.direction(),
-        position=[distance, 0, 0],
-        velocity=[0, speed * math.cos(tilt), speed * math.sin(tilt)],
-    )
-    strength = motion**2 * distance**3 * draw.length**3 / draw.time**2
-    draw.load("central_gravity", f"gravitational_parameter = {strength!r}")
+    draw.fly(draw.direction(), distance, speed, tilt, motion**2 * distance**3)
 
 
 def _free_flight(draw: Draw) -> None:

@@ -38,7 +38,7 @@ SPARSE = ("time.every=8 day", "output.record=['quaternion']", "output.estimate=f
 def left_over(result: Result, package: str = "de421") -> np.ndarray:
     """Rotation vectors from the package's librations, mas, body axes."""
     days = result.values("time") / DAY
-    return bare.left_over(package, START, days, result.values("quaternion"))["vectors"]
+    return bare.left_over(package, START, days, result.values("quaternion"))
 
 
 def rms(vectors: np.ndarray) -> float:
@@ -84,39 +84,6 @@ def by_numbers(constants: Mapping[str, float]) -> list[str]:
 
 def _inline(values: Mapping[str, float]) -> str:
     return "{" + ", ".join(f'"{key}" = {value!r}' for key, value in sorted(values.items())) + "}"
-
-
-@Study
-def study(full: bool) -> Answer:
-    """Librations, effects, the bare program, another package, and the announced error."""
-    whole = simulate(SCENE, *SPARSE[:2])
-    rest = left_over(whole)
-    found = {name: left_over(simulate(SCENE, *SPARSE, *effect[1])) for name, effect in EFFECTS.items()}
-    spin = left_over(simulate(SCENE, *SPARSE, "body.elasticity.raised_by=[]")) - found["distortion"]
-    source = "another program of these equations, rounded; its handling of the delay differs"
-    largest = np.abs(rest).max(axis=0).tolist()
-    checks = [
-        Check(f"largest of the rotation vector's {axis}", largest[k], 0.0, ALLOWED, "mas",
-              "DE421's librations; asked for", "absolute")
-        for k, axis in enumerate("xyz")
-    ]  # fmt: skip
-    checks += [
-        Check(
-            f"left without {EFFECTS[name][0]}", rms(vectors) / 1000, EFFECTS[name][2], 0.2, "arcsec", source
-        )
-        for name, vectors in found.items()
-    ]
-    checks.append(Check("added by the spin's distortion", rms(spin) / 1000, SPIN, 0.2, "arcsec", source))
-    days = float(whole.values("time")[-1]) / DAY
-    checks.append(_same("the bare program", whole, bare.Moon("de421").integrate(days)))
-    constants = blocks.Kernel("de423").constants
-    second = simulate(SCENE, *SPARSE, "ephemeris.kernel=de423", *by_numbers(constants))
-    checks.append(_same("it with de423", second, bare.Moon("de423").integrate(days)))
-    if full:  # what a machine with other work on it would not show
-        checks += _cost(days)
-    checks += _announced(full, whole)
-    figure = picture(whole, rest, found)
-    return checks, figure
 
 
 def _same(name: str, result: Result, other: Mapping[str, Any]) -> Check:
@@ -203,5 +170,33 @@ def _size(mas: float) -> str:
     return f"{mas:.2f} mas" if mas < 1 else f"{mas / 1000:.3g} arcsec"
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool) -> Answer:
+    """Librations, effects, the bare program, another package, and the announced error."""
+    whole = simulate(SCENE, *SPARSE[:2])
+    rest = left_over(whole)
+    found = {name: left_over(simulate(SCENE, *SPARSE, *effect[1])) for name, effect in EFFECTS.items()}
+    spin = left_over(simulate(SCENE, *SPARSE, "body.elasticity.raised_by=[]")) - found["distortion"]
+    source = "another program of these equations, rounded; its handling of the delay differs"
+    largest = np.abs(rest).max(axis=0).tolist()
+    checks = [
+        Check(f"largest of the rotation vector's {axis}", largest[k], 0.0, ALLOWED, "mas",
+              "DE421's librations; asked for", "absolute")
+        for k, axis in enumerate("xyz")
+    ]  # fmt: skip
+    checks += [
+        Check(
+            f"left without {EFFECTS[name][0]}", rms(vectors) / 1000, EFFECTS[name][2], 0.2, "arcsec", source
+        )
+        for name, vectors in found.items()
+    ]
+    checks.append(Check("added by the spin's distortion", rms(spin) / 1000, SPIN, 0.2, "arcsec", source))
+    days = float(whole.values("time")[-1]) / DAY
+    checks.append(_same("the bare program", whole, bare.Moon("de421").integrate(days)))
+    constants = blocks.Kernel("de423").constants
+    second = simulate(SCENE, *SPARSE, "ephemeris.kernel=de423", *by_numbers(constants))
+    checks.append(_same("it with de423", second, bare.Moon("de423").integrate(days)))
+    if full:  # what a machine with other work on it would not show
+        checks += _cost(days)
+    checks += _announced(full, whole)
+    return checks, picture(whole, rest, found)

@@ -1,14 +1,10 @@
 """Does a rigid Earth nutate as the published series of a rigid Earth say?
 
-Method: the ready scene `rigid_earth_nutation` (the Moon, the Sun and the planets of JPL's DE421) over 50
-years around J2000, at three levels: degree 2 with the Moon and the Sun; then J3 and the planets; then
-unequal equatorial moments and the tesserals of degree 3. The figure axis on the mean equator and equinox
-of date (precession of IAU 1976), every line above 0.1 mas fitted in both senses at once, with a cubic and
-the free nutation.
-
-Held against: five published circular amplitudes of a rigid Earth's figure axis, to 0.5 mas: lines of
-182.62 and 182.63 d, and of 365.22 and 365.26 d, can't be told apart in 50 years, which alone leaves 0.3
-mas.
+The ready scene `rigid_earth_nutation` (Moon, Sun and planets of JPL's DE421), 50 years around J2000, at three
+levels: degree 2 with the Moon and the Sun; then J3 and the planets; then unequal equatorial moments and the
+tesserals of degree 3. The figure axis on the mean equator and equinox of date (precession of IAU 1976), every
+line above 0.1 mas fitted in both senses at once, with a cubic and the free nutation. Lines of 182.62 and
+182.63 d, and of 365.22 and 365.26 d, can't be separated in 50 years, which alone leaves 0.3 mas.
 """
 
 from experiments.bare import precession
@@ -44,20 +40,6 @@ def fitted(result: Result) -> nutation.Nutations:
     return nutation.fit(dates, result.values("figure_axis"), 1 / (1 - H))
 
 
-@Study
-def study(full: bool) -> Answer:
-    """Five amplitudes at three levels."""
-    runs = [run(level) for level in range(len(LEVELS))]
-    fits = [fitted(result) for result in runs]
-    figure = picture(runs[-1], fits[-1])
-    return [
-        Check(f"{line}, {name}", fit.amplitude(line), published, 0.5, "mas",
-              "rigid-Earth series; lines that 50 years can't tell apart", "absolute")
-        for name, fit in zip(LEVELS, fits, strict=True)
-        for line, (_, _, published) in nutation.PUBLISHED.items()
-    ], figure  # fmt: skip
-
-
 def picture(result: Result, fit: nutation.Nutations) -> Picture:
     """The pole's nutation about the mean pole of date, and what the fit leaves."""
     dates = START + result.values("time") / DAY
@@ -75,5 +57,14 @@ def picture(result: Result, fit: nutation.Nutations) -> Picture:
     ])  # fmt: skip
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool) -> Answer:
+    """Five amplitudes at three levels."""
+    runs = [run(level) for level in range(len(LEVELS))]
+    fits = [fitted(result) for result in runs]
+    return [
+        Check(f"{line}, {name}", fit.amplitude(line), published, 0.5, "mas",
+              "rigid-Earth series; lines that 50 years can't tell apart", "absolute")
+        for name, fit in zip(LEVELS, fits, strict=True)
+        for line, (_, _, published) in nutation.PUBLISHED.items()
+    ], picture(runs[-1], fits[-1])  # fmt: skip

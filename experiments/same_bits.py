@@ -5,12 +5,11 @@ precisions, held runs, loose tolerances, switching, averages), and closed forms,
 Each is run by both versions, then begun by the other one, stopped at a random step and resumed by this one.
 What counts is every bit of every variable along time.
 
-Run: python -m experiments.same_bits CHECKOUT [--count N] [--seed S]      exit code 1 if any bit differs
+Run: python -m experiments.same_bits --checkout DIR [--count N] [--seed S]      exit code 1 if any bit differs
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import random
@@ -23,6 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from experiments.common import Command
 from experiments.coverage.families import coverage_scene
 
 ROOT = Path(__file__).parents[1]
@@ -162,17 +162,18 @@ def compared(scene: Scene, this: Version, other: Version, stop: random.Random) -
     return "same", "same" if whole["bits"] == mine["bits"] else "differs"
 
 
-def main() -> int:
-    """Command line; returns the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("checkout", type=Path, help="folder of the other version's code")
-    parser.add_argument("--count", type=int, default=138, help="of random scenes")
-    parser.add_argument("--seed", type=int, default=26)
-    asked = parser.parse_args()
-    this, other, stop = Version(ROOT), Version(asked.checkout.resolve()), random.Random(asked.seed)
+@Command
+def campaign(checkout: str = "", count: int = 138, seed: int = 26) -> int:
+    """Compare, and print a table.
+
+    Args:
+        checkout: folder of the other version's code.
+        count: of random scenes.
+    """
+    this, other, stop = Version(ROOT), Version(Path(checkout).resolve()), random.Random(seed)
     runs: dict[str, Counter[str]] = {}
     wrong = 0
-    for scene in scenes(asked.count, asked.seed):
+    for scene in scenes(count, seed):
         whole, resumed = compared(scene, this, other, stop)
         counted = runs.setdefault(scene.kind, Counter())
         counted[whole.split(":")[0]] += 1
@@ -185,7 +186,3 @@ def main() -> int:
     for kind, counted in (*runs.items(), ("all", sum(runs.values(), Counter()))):
         print(f"| {kind} | {' | '.join(str(counted[column]) for column in columns)} |")
     return int(wrong > 0)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

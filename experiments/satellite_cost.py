@@ -2,29 +2,22 @@
 
 A spinning CubeSat at 400 km: the Earth's field to degree 4, gravity gradients of Earth and Sun, drag and
 light on a box and a panel (sides that turn away end a step), the shadow of a point Sun, a magnet and eddy
-currents in a dipole. ``experiments/bare/satellite.py`` writes the same with heyoka alone, from the formulas
-of Montenbruck & Gill and of Wertz, without the work and the drifts that a run has as well.
-
-With a sphere in place of box and panel nothing turns away, and without the shadow no step ends on a surface:
-three rows tell what surfaces cost.
-
-Held against: that script's attitudes, rates and positions (1e-9 of their size); its steps and CPU from the
-first step to the last sample (1.15 asked), the least of several turns over the least, without compiling or
-estimates.
+currents in a dipole. ``experiments/bare/satellite.py`` writes the same with heyoka alone, without the work
+and the drifts that a run has as well. With a sphere nothing turns away, and without the shadow no step ends
+on a surface: three rows show what surfaces cost. CPU from the first step to the last sample (1.15 asked) is
+the least of several turns, without compiling or estimates; attitudes, rates and positions agree to 1e-9 of
+their size.
 
 Run: python -m experiments.satellite_cost [--turns 5] [--hours 24]      exit code 1 if the motions differ
 """
 
-import argparse
 import sys
-from collections.abc import Sequence
 
 import numpy as np
 
 from experiments.bare import satellite as bare
-from experiments.common import Result, simulate
+from experiments.common import Command, Result, simulate
 
-NAME = "satellite_cost"
 APART = 1e-9
 _QUIET = ("output.estimate=false",)
 
@@ -49,7 +42,7 @@ def scene(hours: float = 24.0, *, plates: bool = True, shadow: bool = True) -> s
     ball = f"[[body.surfaces]]\nradius = {bare.BALL}"
     held = f"position = {list(bare.PLACE)}\n{outside}"
     surfaces = "\n".join([box, panel, held] if plates else [ball, held])
-    return f"""name = "{NAME}"
+    return f"""name = "satellite_cost"
 [body]
 principal_moments = {list(bare.MOMENTS)}
 mass = {bare.MASS}
@@ -112,21 +105,18 @@ def apart(ours: Result, theirs: dict[str, np.ndarray]) -> dict[str, float]:
     return found
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """The command; returns its exit code."""
-    parser = argparse.ArgumentParser(prog=f"python -m experiments.{NAME}")
-    parser.add_argument("--turns", type=int, default=5)
-    parser.add_argument("--hours", type=float, default=24.0)
-    arguments = parser.parse_args(argv)
+@Command
+def campaign(turns: int = 5, hours: float = 24.0) -> int:
+    """Print the table; 1 if the motions differ."""
     print("| | CPU, s | of the script, s | ratio | steps | of the script | ratio |")
     print("| --- " * 7 + "|")
     largest = 0.0
     for name, (plates, shadow) in CASES.items():
         script, ours, theirs = bare.Satellite(plates=plates, shadow=shadow), [], []
-        for _ in range(arguments.turns):
-            run = simulate(scene(arguments.hours, plates=plates, shadow=shadow), *_QUIET)
+        for _ in range(turns):
+            run = simulate(scene(hours, plates=plates, shadow=shadow), *_QUIET)
             ours.append(run.summary["cost"]["cpu_by_phase"]["integrate_and_record"])
-            found = script.integrate(arguments.hours)
+            found = script.integrate(hours)
             theirs.append(found["seconds"])
         seconds, steps = (min(ours), min(theirs)), (run.steps, found["steps"])
         cells = [f"{x:.4g} | {y:.4g} | {x / y:.3g}" for x, y in (seconds, steps)]
@@ -135,7 +125,3 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("apart by " + ", ".join(f"{gap:.1e} ({key})" for key, gap in gaps.items()), file=sys.stderr)
         largest = max(largest, *gaps.values())
     return int(not largest < APART)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -1,19 +1,14 @@
 """Are sensitivities right? Random keys and scenes, against differences of runs in higher precision.
 
-    python -m experiments.sensitivity_campaign --scenes 200
+Each case draws a scene (``sensitivity_scenes``) and one number of its config. A run in double precision
+records the derivatives. Four runs with this number moved, in quadruple precision, give the central difference
+of fourth order: steps h of 1e-6 leave some h^4 = 1e-24, and 1e-13 for the 80 bits in which they are
+subtracted. They share nothing with the variational equations but the way from a config to equations. The
+largest difference along the run, relative to the derivative's largest value there, may be 1e-9.
 
-Each case draws a scene (free bodies, tops, torques with parameters, gravity gradients along orbits, flight,
-rotors, cores, elastic bodies, dipoles, states of one's own; written in any formulation, with and without held
-invariants) and one number of its config. A run in double precision records the derivatives. Four runs with
-this number moved, in quadruple precision, give the central difference of fourth order: steps h of 1e-6 leave
-some h^4 = 1e-24, and 1e-13 for the 80 bits in which they are subtracted. They share nothing with the
-variational equations but the way from a config to equations. The largest difference along the run, relative
-to the derivative's largest value there, may be 1e-9. ``--only N`` repeats a case;
-the exit code is 1 if one is off.
+Run: python -m experiments.sensitivity_campaign [--scenes 200] [--first 0]      exit code 1 if one is off
 """
 
-import argparse
-import sys
 import warnings
 from dataclasses import dataclass
 from fractions import Fraction
@@ -23,6 +18,7 @@ import mpmath
 import numpy as np
 
 import rigidsim
+from experiments.common import Command
 from experiments.sensitivity_scenes import Case, case
 from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.scene.varied_keys import varied_keys
@@ -114,7 +110,7 @@ def _moved(given: Any, key: Any, step: Fraction) -> list[str]:
                 exact += mpmath.mpf(step.numerator) / step.denominator
                 value = Fraction(int(exact * 10**45), 10**45)
         text = f'"{value.numerator}/{value.denominator}"'
-        return [f"{'.'.join(_written(place))}={text}" for place in key.places]
+        return [f"{place}={text}" for place in key.places]
     with mpmath.workdps(60):
         q = [
             mpmath.mpf(x.rational.numerator) / x.rational.denominator for x in given.config.initial.quaternion
@@ -133,33 +129,16 @@ def _moved(given: Any, key: Any, step: Fraction) -> list[str]:
         return [f"initial.quaternion={[mpmath.nstr(x, 50) for x in turned]}".replace("'", '"')]
 
 
-def _written(place: tuple[str | int, ...]) -> list[str]:
-    parts: list[str] = []
-    for step in place:
-        if isinstance(step, int):
-            parts[-1] += f"[{step}]"
-        else:
-            parts.append(step)
-    return parts
-
-
 def _whole(dataset: Any, name: str) -> np.ndarray:
     """Values with all their digits, as 80-bit numbers."""
     return sum(dataset[n].to_numpy().astype(np.longdouble) for n in reversed(parts_in(dataset, name)))
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run the campaign."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--scenes", type=int, default=200)
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--only", type=int)
-    chosen = parser.parse_args(arguments)
-    numbers = range(chosen.first, chosen.first + chosen.scenes) if chosen.only is None else [chosen.only]
+@Command
+def campaign(scenes: int = 200, first: int = 0) -> int:
+    """Print a line for each case, and those that are off."""
     off, worst = [], 0.0
-    for number in numbers:
+    for number in range(first, first + scenes):
         one = case(number)
         try:
             found = checked(one)
@@ -167,14 +146,9 @@ def main(arguments: list[str] | None = None) -> int:
             print(f"{number:4d} {one.family:10s} {one.key:34s} refused: {error}", flush=True)
             off.append(number)
             continue
-        worst = max(worst, found.worst)
-        ok = found.worst <= BOUND
-        off += [] if ok else [number]
+        worst, beyond = max(worst, found.worst), found.worst > BOUND
+        off += [number] * beyond
         shown = "  ".join(f"{name.split('_')[0]} {error:.1e}" for name, error in found.errors.items())
-        print(f"{number:4d} {one.family:10s} {one.key:34s} {shown}{'' if ok else '  OFF'}", flush=True)
-    print(f"{len(numbers)} cases, largest relative error {worst:.1e}, {len(off)} off: {off}")
-    return 1 if off else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+        print(f"{number:4d} {one.family:10s} {one.key:34s} {shown}{'  OFF' * beyond}", flush=True)
+    print(f"{scenes} cases, largest relative error {worst:.1e}, {len(off)} off: {off}")
+    return int(bool(off))

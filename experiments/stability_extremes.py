@@ -145,7 +145,3 @@ def extremes(full: bool, random: int = -1) -> Answer:
     silent = sum(v.kind == "SILENT" for v in verdicts + drawn)
     check = Check("runs that are wrong in silence", silent, 0, 0.0, "1", "none may", "absolute")
     return [check], picture(verdicts + drawn)
-
-
-if __name__ == "__main__":
-    raise SystemExit(extremes.main())

@@ -1,41 +1,31 @@
 """Are the announced errors of a sweep's members true?
 
-Question: members of a sweep run side by side, and what each is announced to be wrong by is measured by
-neighbours that are carried along in batches. Is it, whatever the motion?
+Random members of several kinds of sweeps run side by side, with neighbours in the same batches: free bodies,
+some near the separatrix, satellites on eccentric orbits, planar spins in a chaotic sea, tops, damped and
+driven bodies, flights. Each runs again with 80 bits, whose errors are two thousand times smaller, and its
+last attitude (and position) is compared by the rules of ``error_coverage``. Among fewer than a hundred
+members 1 % is one of them.
 
-Method: random members of several kinds of sweeps: free bodies, among them some near the separatrix,
-satellites on eccentric orbits, planar spins in a chaotic sea, tops, bodies that are damped and driven, bodies
-that fly past what attracts them. Each is run again with 80 bits, whose errors are two thousand times smaller,
-and its last attitude (and position) compared.
-
-Held against: the rules of ``experiments/error_coverage.py``: the true error is at most three times the
-announced one in 99 % of the members, in none more than ten times without a warning, and announced errors are
-at most twenty times the true one in the median. Among fewer than a hundred members 1 % is one of them.
-
-Run: python -m experiments.sweep_coverage [--members 60] [--seed 1] [--only KIND ...] [--out DIR]
+Run: python -m experiments.sweep_coverage [--members 60] [--seed 1] [--only "KIND KIND"] [--out DIR]
 """
 
 import math
-import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import mpmath
 import numpy as np
 
 from experiments.common import Answer, Check, Curve, Panel, Picture, Study
-from experiments.coverage.judging import gone_through
+from experiments.coverage.judging import angle, apart, compactly, gone_through
 from experiments.coverage.sweep_kinds import KINDS
-from rigidsim.scene.config import Experiment, parse
-from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.config import Experiment
 from rigidsim.session.members import warning_bits
-from rigidsim.solve.problem import prepare
 from rigidsim.solve.status import Status
 from rigidsim.workflows.sweeps.members import run_members
 
 _MEMBERS, _SEED = 60, 1
 _CHEAP, _FEW_MEMBERS = ("free, short", "planar", "tops", "driven", "flights"), 8
-_WARM = 16  # members, in batches of up to 8; one alone would leave their compilation to whoever is first
 _GONE = warning_bits(["attitude_uncertain"])
 _MOST_RATIO, _WORST_RATIO, _MOST_CAUTION = 3.0, 10.0, 20.0
 _FEW = 0.01
@@ -51,14 +41,12 @@ class Found:
         true, announced: errors at the end, rad or m.
         warned: whether the member says that its digits are gone.
         side_by_side: how many ran in batches.
-        seconds: of CPU a member, without and with estimates.
     """
 
     true: np.ndarray
     announced: np.ndarray
     warned: np.ndarray
     side_by_side: int
-    seconds: tuple[float, float]
 
     @property
     def ratio(self) -> np.ndarray:
@@ -70,64 +58,26 @@ def found_of(kind: str, members: int, seed: int) -> list[tuple[str, Found]]:
     """Run a kind's members, side by side and better; attitude first, then position where there is one."""
     sweep = KINDS[kind].sweep(kind.replace(", ", "_").replace(" ", "_").replace("-", "_"), members, seed)
     everybody = range(sweep.count)
-    silent = Sweep.of(parse(sweep.experiment.text.replace("[output]", "[output]\nestimate = false")))
-    seconds = []
-    for which in (silent, sweep):
-        run_members(which, everybody[:_WARM], ["final"])  # compiled, for whole batches
-        before = time.process_time()
-        results = run_members(which, everybody, ["final"])
-        seconds.append((time.process_time() - before) / members)
+    results = run_members(sweep, everybody, ["final"])
     ran = sum(number for engine, number in results.engines.items() if engine != "alone")
     truths = [_better(sweep.experiment_of(member), KINDS[kind].recorded) for member in everybody]
     warned = (results.kept["warnings"].values & _GONE) > 0
-    told = []
-    for name, (what, apart) in {"quaternion": ("attitude", _angle), "position": ("position", _way)}.items():
+    found = []
+    for name, (what, away) in {"quaternion": ("attitude", angle), "position": ("position", apart)}.items():
         if name in KINDS[kind].recorded:
-            last = results.kept[f"{name}_final"].values
-            true = [apart(mine, truth[name]) for mine, truth in zip(last, truths, strict=True)]
-            told.append((what, np.array(true), results.kept[f"{what}_error"].values))
-    return [
-        (what, Found(true, announced, warned, ran, (seconds[0], seconds[1])))
-        for what, true, announced in told
-    ]
+            pairs = zip(results.kept[f"{name}_final"].values.tolist(), truths, strict=True)
+            true = np.array([float(away([mine], [truth[name]])) for mine, truth in pairs])
+            found.append((what, Found(true, results.kept[f"{what}_error"].values, warned, ran)))
+    return found
 
 
 def _better(experiment: Experiment, names: Sequence[str]) -> dict[str, list[mpmath.mpf]]:
     """The last sample of what is recorded, by a run with 80 bits."""
     better = ['integrator.precision="extended"', 'integrator.tolerance="auto"', "output.estimate=false"]
-    prepared = prepare(experiment.having([*better, 'integrator.formulation="quaternion"']))
-    compact = replace(prepared, precision=replace(prepared.precision, compact=True))
-    seen, progress, *_ = gone_through(compact)
+    better.append('integrator.formulation="quaternion"')
+    seen, progress, _ = gone_through(compactly(experiment.having(better)))
     assert progress.status is Status.FINISHED
     return {name: seen.exact(name)[-1] for name in names}
-
-
-def _angle(mine: np.ndarray, there: list[mpmath.mpf]) -> float:
-    with mpmath.workdps(40):
-        chord = min(
-            mpmath.norm([float(a) - s * b for a, b in zip(mine, there, strict=True)]) for s in (1, -1)
-        )
-        return float(4 * mpmath.asin(min(chord / 2, mpmath.mpf(1))))
-
-
-def _way(mine: np.ndarray, there: list[mpmath.mpf]) -> float:
-    with mpmath.workdps(40):
-        return float(mpmath.norm([float(a) - b for a, b in zip(mine, there, strict=True)]))
-
-
-@Study
-def study(full: bool, members: int = 0, seed: int = _SEED, only: str = "") -> Answer:
-    """All kinds, or some members of the cheap ones; the figure, the checks."""
-    members = members or (_MEMBERS if full else _FEW_MEMBERS)
-    told: list[tuple[str, Found]] = []
-    print(
-        "kind                      members  >3x  >10x unwarned  worst  median announced/true  gone  CPU ratio"
-    )
-    for kind in only.split() or (KINDS if full else _CHEAP):
-        for what, found in found_of(kind, members, seed):
-            print(line(kind, what, found), flush=True)
-            told.append((what, found))
-    return judged([found for what, found in told if what == "attitude"]), picture(told)
 
 
 def picture(told: Sequence[tuple[str, Found]]) -> Picture:
@@ -164,8 +114,7 @@ def line(kind: str, what: str, found: Found) -> str:
     above = int((ratio > _MOST_RATIO).sum())
     return (
         f"{name:25s} {found.side_by_side:3d}/{len(ratio):3d}  {above:3d}  {beyond:13d}  "
-        f"{float(np.nanmax(ratio)):5.2g}  {caution:21.3g}  {int(warned.sum()):4d}  "
-        f"{found.seconds[1] / found.seconds[0]:9.2f}"
+        f"{float(np.nanmax(ratio)):5.2g}  {caution:21.3g}  {int(warned.sum()):4d}"
     )
 
 
@@ -186,5 +135,14 @@ def judged(found: Sequence[Found]) -> list[Check]:
     return [Check(name, float(value), 0, most, "1", asked, "absolute") for name, value, most in rows]
 
 
-if __name__ == "__main__":
-    raise SystemExit(study.main())
+@Study
+def study(full: bool, members: int = 0, seed: int = _SEED, only: str = "") -> Answer:
+    """All kinds, or some members of the cheap ones; the figure, the checks."""
+    members = members or (_MEMBERS if full else _FEW_MEMBERS)
+    told: list[tuple[str, Found]] = []
+    print("kind                      members  >3x  >10x unwarned  worst  median announced/true  gone")
+    for kind in only.split() or (KINDS if full else _CHEAP):
+        for what, found in found_of(kind, members, seed):
+            print(line(kind, what, found), flush=True)
+            told.append((what, found))
+    return judged([found for what, found in told if what == "attitude"]), picture(told)

@@ -13,10 +13,6 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
 DOWN = [0, 0, -1]
-UNIT_ROUNDOFF = 2.0**-53
-# A state is some thirty operations on numbers up to 1, none of which is amplified, and numpy's sines are
-# right to 4 ulp.
-DOUBLE = 100 * UNIT_ROUNDOFF
 
 
 def scene(

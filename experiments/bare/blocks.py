@@ -6,8 +6,11 @@ polynomials. Kilometres, days, axes of the ICRF.
 """
 
 import importlib
+import math
 from pathlib import Path
+from typing import Any
 
+import heyoka as hy
 import numpy as np
 from numpy.polynomial import chebyshev
 
@@ -94,3 +97,50 @@ def later(coefficients: np.ndarray, days: float) -> np.ndarray:
         line = np.polynomial.polynomial.polypow([shift, 1.0], k)
         matrix[: k + 1, k] = line
     return coefficients @ matrix.T
+
+
+class Columns:
+    """Polynomials as rows of an integrator's parameters, one row a block.
+
+    Args:
+        series: powers' coefficients (blocks, 3, count) by name.
+    """
+
+    def __init__(self, series: dict[str, np.ndarray]) -> None:
+        self.rows = np.concatenate([values.reshape(len(values), -1) for values in series.values()], axis=1)
+        self._where, at = {}, 0
+        for name, values in series.items():
+            self._where[name] = (at, values.shape[-1])
+            at += 3 * values.shape[-1]
+
+    def place(self, name: str) -> list:
+        """Of a body, in heyoka's time, which counts from the block's edge; empty if unknown."""
+        if name not in self._where:
+            return []
+        first, count = self._where[name]
+        s, found = 2.0 / DAYS * hy.time - 1.0, []
+        for axis in range(3):  # Horner's rule
+            value: Any = hy.par[first + axis * count + count - 1]
+            for k in range(count - 2, -1, -1):
+                value = hy.par[first + axis * count + k] + s * value
+            found.append(value)
+        return found
+
+    def begin(self, name: str) -> list[float]:
+        """At the first block's edge, s = -1."""
+        if name not in self._where:
+            return []
+        first, count = self._where[name]
+        series = self.rows[0, first : first + 3 * count].reshape(3, count)
+        return [float(x) for x in series @ (-1.0) ** np.arange(count)]
+
+
+def euler_quaternion(*turns: tuple[float, int]) -> np.ndarray:
+    """Of turns by angles about axes (1, 2 or 3) of the body, one after the other."""
+    q = np.array([1.0, 0.0, 0.0, 0.0])
+    for angle, axis in turns:
+        turn = np.zeros(4)
+        turn[0], turn[axis] = math.cos(angle / 2), math.sin(angle / 2)
+        vector = q[0] * turn[1:] + turn[0] * q[1:] + np.cross(q[1:], turn[1:])
+        q = np.array([q[0] * turn[0] - q[1:] @ turn[1:], *vector])
+    return q

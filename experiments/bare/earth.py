@@ -1,15 +1,11 @@
 """A rigid Earth turned by Moon, Sun and planets, with heyoka alone: its nutations beside the published ones.
 
-python -m experiments.bare.earth [--level 1|2|3] [--days 18264] [--package de421]
-
 Level 1 is degree 2 with Moon and Sun, level 2 adds J3 and the planets, level 3 the difference of the
 equatorial moments and the tesserals of degree 3 (felt by the Moon and the Sun). Moments from H = (C -
 A)/C of the rigid-Earth series and the package's J2. Rates in body axes and a quaternion, kilometres and
 days, blocks as in ``moon``.
 """
 
-import argparse
-import json
 import math
 import time
 from typing import Any
@@ -19,7 +15,6 @@ import numpy as np
 
 from experiments.bare import blocks, mechanics, precession
 from experiments.bare.mechanics import total
-from experiments.real_bodies import nutation
 
 H = 0.0032737548
 RADIUS = 6378.1366
@@ -53,23 +48,15 @@ class Earth:
                 self.field[n, m] = (cosine * a + sine * b, sine * a - cosine * b)
         self.free_rate = 1 + (polar - mean) / mean
 
-    def equations(self, where: dict[str, tuple[int, int]]) -> list:
+    def equations(self, columns: blocks.Columns) -> list:
         """heyoka's system; time counts from the block's edge."""
         states = hy.make_vars(*(f"w{k}" for k in "xyz"), *(f"q{k}" for k in "wxyz"))
         w, q = states[:3], states[3:]
-        s = 2.0 / blocks.DAYS * hy.time - 1.0
         a, b, c = self.moments
         tensor = [[a, 0.0, 0.0], [0.0, b, 0.0], [0.0, 0.0, c]]
         torque: list = [(b - c) * w[1] * w[2], (c - a) * w[2] * w[0], (a - b) * w[0] * w[1]]
         for name in self.sources:
-            first, count = where[name]
-            place = []
-            for axis in range(3):
-                value: Any = hy.par[first + axis * count + count - 1]
-                for k in range(count - 2, -1, -1):
-                    value = hy.par[first + axis * count + k] + s * value
-                place.append(value)
-            seen, parameter = mechanics.to_body(q, place), self.kernel.parameters[name]
+            seen, parameter = mechanics.to_body(q, columns.place(name)), self.kernel.parameters[name]
             torque = total(torque, mechanics.gradient_torque(parameter, seen, tensor))
             if self.field and name in ("moon", "sun"):
                 torque = total(torque, mechanics.field_torque(parameter, seen, RADIUS, self.field))
@@ -84,36 +71,21 @@ class Earth:
         turned = 2 * math.pi * ((0.7790572732640 + 1.00273781191135448 * days) % 1.0) + self.longitude
         node = np.array([-pole[1], pole[0], 0.0])  # the ascending node of the equator on that of J2000
         right_ascension, tilt = math.atan2(node[1], node[0]), math.acos(pole[2])
-        q = np.array([1.0, 0.0, 0.0, 0.0])
-        for angle, axis in ((right_ascension, 3), (tilt, 1), (turned - right_ascension, 3)):
-            turn = np.zeros(4)
-            turn[0], turn[axis] = math.cos(angle / 2), math.sin(angle / 2)
-            q = np.array(
-                [
-                    q[0] * turn[0] - q[1:] @ turn[1:],
-                    *(q[0] * turn[1:] + turn[0] * q[1:] + np.cross(q[1:], turn[1:])),
-                ]
-            )
+        q = blocks.euler_quaternion((right_ascension, 3), (tilt, 1), (turned - right_ascension, 3))
         return np.array([0.0, 0.0, 2 * math.pi * 1.00273781191135448, *q])
 
     def integrate(self, days: float) -> dict[str, Any]:
         """Attitudes five times a block, and the cost."""
         count = math.ceil(days / blocks.DAYS)
-        where, columns, at = {}, [], 0
-        for name, series in self.kernel.places("earth", self.sources, START, count).items():
-            terms = blocks.terms(series)
-            where[name] = (at, terms)
-            at += 3 * terms
-            columns.append(blocks.powers(series, terms).reshape(count, -1))
-        rows = np.concatenate(columns, axis=1)
-        began = time.process_time()
+        places = self.kernel.places("earth", self.sources, START, count)
+        columns = blocks.Columns({name: blocks.powers(x, blocks.terms(x)) for name, x in places.items()})
         integrator = hy.taylor_adaptive(
-            self.equations(where), self.initial(), compact_mode=True, pars=rows[0]
+            self.equations(columns), self.initial(), compact_mode=True, pars=columns.rows[0]
         )
         compiled = time.process_time()
         grid = np.linspace(0.0, blocks.DAYS, SAMPLES + 1)
         states, steps = [], 0
-        for row in rows:
+        for row in columns.rows:
             integrator.time = 0.0
             integrator.pars[:] = row
             told = integrator.propagate_grid(grid)
@@ -125,7 +97,6 @@ class Earth:
             "dates": dates,
             "quaternion": np.concatenate(states),
             "steps": steps,
-            "compile": compiled - began,
             "seconds": done - compiled,
         }
 
@@ -134,27 +105,3 @@ def figure_axis(quaternions: np.ndarray) -> np.ndarray:
     """Of the body's z axis, in space axes, (n, 3)."""
     q = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
     return np.stack([row[2] for row in mechanics.body_to_space(list(q.T))], axis=1)
-
-
-def main() -> None:
-    """One run, told in a line of JSON."""
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--level", type=int, default=3)
-    options.add_argument("--days", type=float, default=18264.0)
-    options.add_argument("--package", default="de421")
-    given = options.parse_args()
-    earth = Earth(given.package, given.level)
-    found = earth.integrate(given.days)
-    lines = nutation.fit(found["dates"], figure_axis(found["quaternion"]), earth.free_rate)
-    shown = {key: found[key] for key in ("steps", "compile", "seconds")}
-    shown["amplitudes"] = {
-        name: [round(lines.amplitude(name), 3), published]
-        for name, (_, _, published) in nutation.PUBLISHED.items()
-    }
-    shown["free"], shown["rest"] = abs(lines.free), float(np.sqrt(np.mean(abs(lines.rest) ** 2)))
-    shown["secular"] = [str(np.round(x, 3)) for x in lines.secular]
-    print(json.dumps(shown))
-
-
-if __name__ == "__main__":
-    main()

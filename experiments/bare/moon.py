@@ -1,21 +1,15 @@
 """The full Moon of DE421 with heyoka alone: degree 4, Sun, planets, Earth's figure, tide, spin, delay, core.
 
-python -m experiments.bare.moon [OUT.npz] [--days 18264] [--package de421] [--without core,degree4,...]
-
 States are the mantle's momentum (not its rate), the core's rate in the mantle's axes, and a quaternion:
 with the momentum nothing asks for the distorted tensor's rate of change, since L' = N + N_c - w x L, and
 w = (I + dI - I_c)^-1 L. What dI needs of w is taken from the undistorted tensor first, then from that
 result (dI/I is 1e-6: the second time is exact to rounding). The delayed tide is computed from the Earth's
 polynomial at t - tau itself, in the body axes of then, to the third order in the angle turned since.
 Kilometres and days; each block of four days has its own time, and the sources' polynomials are parameters
-of the compiled system. What is left over against the package's own librations is printed; nothing is
-fitted.
+of the compiled system. Nothing is fitted to the package's own librations.
 """
 
-import argparse
-import json
 import math
-import resource
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -140,9 +134,8 @@ class Moon:
             torque = total(torque, mechanics.gradient_torque(self.kernel.parameters[name], seen, change))
         return w, total(torque, self.figure_torque(q, mechanics.to_body(q, places["earth"]), change, pole))
 
-    def parameters(self, count: int) -> tuple[np.ndarray, dict[str, tuple[int, int]]]:
-        """Rows of parameters, one a block, and each polynomial's first column and number of terms."""
-        columns, where, at = [], {}, 0
+    def columns(self, count: int) -> blocks.Columns:
+        """Places of the sources, the Earth's a delay ago, and its pole."""
         found = {
             name: blocks.powers(series, blocks.terms(series))
             for name, series in self.kernel.places("moon", self.sources, self.start, count).items()
@@ -155,35 +148,16 @@ class Moon:
         series = np.swapaxes(np.linalg.inv(chebyshev.chebvander(nodes, 2)) @ poles, 1, 2)
         if "figure" not in self.without:
             found["pole"] = blocks.powers(series, 3)
-        for name, values in found.items():
-            where[name] = (at, values.shape[-1])
-            at += 3 * values.shape[-1]
-            columns.append(values.reshape(count, -1))
-        return np.concatenate(columns, axis=1), where
+        return blocks.Columns(found)
 
-    def equations(self, where: dict[str, tuple[int, int]]) -> list:
+    def equations(self, columns: blocks.Columns) -> list:
         """heyoka's system; time counts from the block's edge."""
         names = [f"l{k}" for k in "xyz"] + [f"q{k}" for k in "wxyz"]
         names += [f"c{k}" for k in "xyz"] if self.core_polar else []
         states = hy.make_vars(*names)
-        s = 2.0 / blocks.DAYS * hy.time - 1.0
-
-        def polynomial(name: str) -> list:
-            """Horner's rule, three axes."""
-            if name not in where:
-                return []
-            first, count = where[name]
-            found = []
-            for axis in range(3):
-                value: Any = hy.par[first + axis * count + count - 1]
-                for k in range(count - 2, -1, -1):
-                    value = hy.par[first + axis * count + k] + s * value
-                found.append(value)
-            return found
-
         momentum, q, core = states[:3], states[3:7], states[7:]
-        places = {name: polynomial(name) for name in self.sources}
-        w, torque = self.motion(momentum, core, q, places, polynomial("delayed"), polynomial("pole"))
+        places = {name: columns.place(name) for name in self.sources}
+        w, torque = self.motion(momentum, core, q, places, columns.place("delayed"), columns.place("pole"))
         right = total(torque, scaled(-1.0, mechanics.cross(w, momentum))) + mechanics.quaternion_rate(q, w)
         if self.core_polar:
             right += mechanics.core_acceleration(
@@ -191,50 +165,31 @@ class Moon:
             )
         return list(zip(states, right, strict=True))
 
-    def initial(self, row: np.ndarray, where: dict[str, tuple[int, int]]) -> np.ndarray:
+    def initial(self, columns: blocks.Columns) -> np.ndarray:
         """The package's start: the momentum that belongs to its rate."""
         c = self.constants
-        q = np.array([1.0, 0.0, 0.0, 0.0])
-        for angle, axis in ((c["PHI"], 3), (c["THT"], 1), (c["PSI"], 3)):
-            turn = np.zeros(4)
-            turn[0], turn[axis] = math.cos(angle / 2), math.sin(angle / 2)
-            q = np.concatenate(
-                [
-                    [q[0] * turn[0] - q[1:] @ turn[1:]],
-                    q[0] * turn[1:] + turn[0] * q[1:] + np.cross(q[1:], turn[1:]),
-                ]
-            )
+        q = blocks.euler_quaternion((c["PHI"], 3), (c["THT"], 1), (c["PSI"], 3))
         rate = np.array([c["OMEGAX"], c["OMEGAY"], c["OMEGAZ"]])
         core = np.array([c["OMGCX"], c["OMGCY"], c["OMGCZ"]]) if self.core_polar else np.zeros(3)
-
-        def place(name: str) -> list[float]:
-            """At the block's edge, s = -1."""
-            if name not in where:
-                return []
-            first, count = where[name]
-            series = row[first : first + 3 * count].reshape(3, count)
-            return [float(x) for x in series @ (-1.0) ** np.arange(count)]
-
-        places = {name: place(name) for name in self.sources}
+        places = {name: columns.begin(name) for name in self.sources}
+        far = columns.begin("delayed"), columns.begin("pole")
         momentum = np.array(self.moments) * rate
         for _ in range(5):
-            w, _ = self.motion(list(momentum), list(core), list(q), places, place("delayed"), place("pole"))
+            w, _ = self.motion(list(momentum), list(core), list(q), places, *far)
             momentum = momentum + np.array(self.moments) * (rate - np.array(w))
         return np.concatenate([momentum, q, core if self.core_polar else []])
 
     def integrate(self, days: float, tolerance: float | None = None) -> dict[str, Any]:
         """States at the block edges, and the cost."""
         count = math.ceil(days / blocks.DAYS)
-        began = time.process_time()
-        rows, where = self.parameters(count)
-        read = time.process_time()
+        columns = self.columns(count)
         options = {} if tolerance is None else {"tol": tolerance}
         integrator = hy.taylor_adaptive(
-            self.equations(where), self.initial(rows[0], where), compact_mode=True, pars=rows[0], **options
+            self.equations(columns), self.initial(columns), compact_mode=True, pars=columns.rows[0], **options
         )
         compiled = time.process_time()
         states, steps = [integrator.state.copy()], 0
-        for row in rows:
+        for row in columns.rows:
             integrator.time = 0.0
             integrator.pars[:] = row
             steps += integrator.propagate_until(blocks.DAYS)[3]
@@ -246,10 +201,7 @@ class Moon:
             "quaternion": found[:, 3:7],
             "states": found,
             "steps": steps,
-            "read": read - began,
-            "compile": compiled - read,
             "seconds": done - compiled,
-            "expressions": len(integrator.decomposition),
         }
 
 
@@ -289,35 +241,6 @@ def matrices(quaternions: np.ndarray) -> np.ndarray:
     return np.moveaxis(np.array(mechanics.body_to_space(list(q.T))), -1, 0)
 
 
-def left_over(package: str, start: float, days: np.ndarray, quaternions: np.ndarray) -> dict[str, Any]:
+def left_over(package: str, start: float, days: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
     """Rotation vectors from the package's librations to these attitudes, milliarcseconds."""
-    vectors = between(matrices(quaternions), librations(package, start + days)) * MAS
-    return {
-        "vectors": vectors,
-        "rms": float(np.sqrt((vectors**2).sum(axis=1).mean())),
-        "components": np.abs(vectors).max(axis=0).tolist(),
-    }
-
-
-def main() -> None:
-    """One run, told in a line of JSON."""
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("out", nargs="?")
-    options.add_argument("--days", type=float, default=18264.0)
-    options.add_argument("--package", default="de421")
-    options.add_argument("--without", default="")
-    options.add_argument("--tolerance", type=float)
-    given = options.parse_args()
-    moon = Moon(given.package, [name for name in given.without.split(",") if name])
-    found = moon.integrate(given.days, given.tolerance)
-    rest = left_over(given.package, moon.start, found["days"], found["quaternion"])
-    if given.out:
-        np.savez(given.out, days=found["days"], states=found["states"], vectors=rest["vectors"])
-    shown = {key: found[key] for key in ("steps", "expressions", "read", "compile", "seconds")}
-    shown |= {"rms_mas": rest["rms"], "largest_mas": rest["components"]}
-    shown["peak"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    print(json.dumps(shown))
-
-
-if __name__ == "__main__":
-    main()
+    return between(matrices(quaternions), librations(package, start + days)) * MAS

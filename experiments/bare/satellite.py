@@ -6,12 +6,8 @@ and 3.5, Wertz 1978, 17.2), the Earth's shadow of a point Sun, a magnet and eddy
 radii and circular periods over 2 pi for units; sides of faces are numbers that events turn. Or a sphere in
 place of box and panel, which has no sides, in full light or with the shadow. The scenes are in
 ``experiments/satellite_cost.py``.
-
-python -m experiments.bare.satellite [--hours 24]
 """
 
-import argparse
-import json
 import math
 import time
 from collections.abc import Sequence
@@ -19,6 +15,8 @@ from typing import Any
 
 import heyoka as hy
 import numpy as np
+
+from experiments.bare.mechanics import cross, dot, quaternion_rate
 
 MU, RADIUS = 3.986004418e14, 6378136.6
 UNIT = math.sqrt(RADIUS**3 / MU)
@@ -34,16 +32,6 @@ C = {(2, 0): -1.0826e-3, (2, 2): 1.5745e-6, (3, 0): 2.53e-6, (3, 1): 2.193e-6, (
 S = {(2, 2): -9.0387e-7, (3, 1): 2.68e-7}
 POSITION, VELOCITY = (6.778e6, 0.0, 0.0), (0.0, 4769.0, 6004.0)
 RATES, QUATERNION = (0.004, -0.003, 0.04), (0.6, -0.4, 0.5, 0.3)
-
-
-def dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
-    """Of expressions or numbers."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def cross(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
-    """Of expressions or numbers."""
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def field(x: Sequence[Any]) -> list[Any]:
@@ -135,13 +123,7 @@ class Satellite:
         earth = [cosine * a[0] - sine * a[1], sine * a[0] + cosine * a[1], a[2]]
         total = [p + q for p, q in zip(box, panel, strict=True)]
         pushed = [UNIT**2 / RADIUS / MASS * dot(row, total) for row in self.r]
-        q0, q1, q2, q3 = self.q
-        turning = [
-            -0.5 * (q1 * wx + q2 * wy + q3 * wz),
-            0.5 * (q0 * wx + q2 * wz - q3 * wy),
-            0.5 * (q0 * wy + q3 * wx - q1 * wz),
-            0.5 * (q0 * wz + q1 * wy - q2 * wx),
-        ]
+        turning = quaternion_rate(self.q, self.w)
         flight = [p + q for p, q in zip(earth, pushed, strict=True)]
         edge = dot(self.x, sun) + hy.sqrt(dot(self.x, self.x) - 1.0)
         rates = [*self.v, *flight, *right, *turning]
@@ -179,7 +161,6 @@ class Satellite:
 
     def integrate(self, hours: float = 24.0, samples: int = 1441) -> dict[str, Any]:
         """Samples in SI, and the cost."""
-        began = time.process_time()
         equations, looks = self.equations()
         start = [x / RADIUS for x in POSITION] + [v * UNIT / RADIUS for v in VELOCITY]
         size = math.sqrt(dot(QUATERNION[:3], QUATERNION[:3]) + QUATERNION[3] ** 2)
@@ -217,13 +198,5 @@ class Satellite:
             "angular_velocity": rows[:, 6:9] / UNIT,
             "quaternion": rows[:, 9:] / np.linalg.norm(rows[:, 9:], axis=1, keepdims=True),
             "steps": steps,
-            "compile": compiled - began,
             "seconds": done - compiled,
         }
-
-
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(prog="python -m experiments.bare.satellite")
-    parser.add_argument("--hours", type=float, default=24.0)
-    found = Satellite().integrate(parser.parse_args().hours)
-    print(json.dumps({key: found[key] for key in ("steps", "compile", "seconds")}))

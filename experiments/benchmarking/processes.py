@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-BARE = ROOT / "experiments" / "bare"
+SCRIPT = str(ROOT / "experiments" / "bare" / "free_body.py")
 Figures = dict[str, float]
 """``cpu`` and ``wall`` seconds; ``peak``, MB of memory."""
 

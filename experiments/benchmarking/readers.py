@@ -43,21 +43,8 @@ def _h5dump(path: Path, variable: str, expected: np.ndarray) -> str:
     program = shutil.which("h5dump")
     if program is None:
         return "not installed"
-    command = [
-        program,
-        "-y",
-        "-w",
-        "0",
-        "-m",
-        "%.17g",
-        "-d",
-        variable,
-        "-s",
-        "0",
-        "-c",
-        str(len(expected)),
-        path,
-    ]
+    rows = f"-s 0 -c {len(expected)}".split()
+    command = [program, *["-y", "-w", "0", "-m", "%.17g", "-d"], variable, *rows, path]
     said = subprocess.run(command, capture_output=True, text=True, check=False)
     if said.returncode:
         return f"refused: {said.stderr.strip()[-200:]}"

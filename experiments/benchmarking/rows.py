@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments.benchmarking.processes import BARE, Figures, told, whole
+from experiments.benchmarking.processes import SCRIPT, Figures, told, whole
 
 CONFIG = """name = "benchmark"
 [body]
@@ -27,15 +27,8 @@ _EXTENDED_TOLERANCE = 2.0**-66
 _MODULE = ("-m", "experiments.benchmarking.ours")
 
 
-@dataclass(frozen=True)
-class Job:
-    """One thing that is run in a fresh process.
-
-    Attributes:
-        run: takes a folder of its own, and whether estimates are on.
-    """
-
-    run: Callable[[Path, bool], Figures]
+Job = Callable[[Path, bool], Figures]
+"""Something to run in a fresh process: takes a folder, and whether estimates are on."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +65,7 @@ class Scene:
     precision: str = "double"
     timeline: bool = False
 
-    def config(self, folder: Path, *, estimate: bool) -> str:
+    def config(self, folder: Path, estimate: bool) -> str:
         """The path of its config, written into a folder."""
         path = folder / "benchmark.toml"
         values = {"end": self.end, "samples": self.samples, "precision": self.precision}
@@ -83,43 +76,31 @@ class Scene:
     @property
     def run(self) -> Job:
         """A run folder, imports apart."""
-        return Job(
-            lambda folder, estimate: told([*_MODULE, self.config(folder, estimate=estimate), str(folder)])
-        )
+        return lambda folder, estimate: told([*_MODULE, self.config(folder, estimate), str(folder)])
 
     @property
     def command(self) -> Job:
         """The command line as a whole."""
-
-        def go(folder: Path, estimate: bool) -> Figures:
-            config = self.config(folder, estimate=estimate)
-            return whole(["-m", "rigidsim", "run", config, "--out", str(folder)])
-
-        return Job(go)
+        begin = ("-m", "rigidsim", "run")
+        return lambda folder, estimate: whole([*begin, self.config(folder, estimate), "--out", str(folder)])
 
     @property
     def warm(self) -> Job:
         """In memory, again and again."""
+        again = ("--again", str(_TIMES))
+        return lambda folder, estimate: told([*_MODULE, self.config(folder, estimate), *again])
 
-        def go(folder: Path, estimate: bool) -> Figures:
-            return told([*_MODULE, self.config(folder, estimate=estimate), "--again", str(_TIMES)])
-
-        return Job(go)
-
-    def script(self, name: str, tolerance: float | None = None) -> Job:
-        """A script of ``experiments/bare``; at heyoka's own tolerance unless another is given."""
-
-        def go(folder: Path, _: bool) -> Figures:
-            more = ["extended"] if self.precision == "extended" else []
-            more += [] if tolerance is None else [repr(tolerance)]
-            return told([str(BARE / name), str(folder / "bare.h5"), str(self.end), str(self.samples), *more])
-
-        return Job(go)
+    def script(self, kind: str, tolerance: float | None = None) -> Job:
+        """The script of ``experiments/bare``; at heyoka's own tolerance unless another is given."""
+        more = ["extended"] if self.precision == "extended" else []
+        more += [] if tolerance is None else [repr(tolerance)]
+        given = [str(self.end), str(self.samples), *more]
+        return lambda folder, _: told([SCRIPT, kind, str(folder / "bare.h5"), *given])
 
 
 def imports(*modules: str) -> Job:
     """An interpreter that does nothing but import."""
-    return Job(lambda folder, estimate: whole(["-c", f"import {', '.join(modules)}"]))
+    return lambda folder, estimate: whole(["-c", f"import {', '.join(modules)}"])
 
 
 def rows(*, quick: bool) -> list[Row]:
@@ -138,25 +119,25 @@ def rows(*, quick: bool) -> list[Row]:
     return [
         Row(
             "sparse", f"free body, {_span(sparse)}", "`propagate_grid` + h5py", 1.03,
-            sparse.run, sparse.script("free_body_sparse.py"),
+            sparse.run, sparse.script("sparse"),
         ),
         Row(
             "dense", f"free body, {_span(dense)}, default record",
             "script with the same variables, gzip 4 + shuffle", 0.6,
-            dense.run, dense.script("free_body_dense.py"), dataset=True,
+            dense.run, dense.script("dense"), dataset=True,
         ),
         Row(
             "timeline", f"the same with its timeline ({min(shown.samples, 100_000):,} rows)",
             "the same script without one", 0.8,
-            shown.run, dense.script("free_body_dense.py"),
+            shown.run, dense.script("dense"),
         ),
         Row(
             "extended", f"80-bit, {_span(extended)}", "the same script in 80-bit arithmetic", 1.02,
-            extended.run, extended.script("free_body_dense.py"), dataset=True,
+            extended.run, extended.script("dense"), dataset=True,
         ),
         Row(
             "extended_alike", f"80-bit, {_span(extended)}", "that script at the tolerance of rigidsim", 1.02,
-            extended.run, extended.script("free_body_dense.py", _EXTENDED_TOLERANCE), dataset=True,
+            extended.run, extended.script("dense", _EXTENDED_TOLERANCE), dataset=True,
         ),
         Row(
             "memory", f"{many.samples:.0e} samples: peak memory", f"{few.samples:.0e} samples", 1.1,
@@ -173,7 +154,7 @@ def rows(*, quick: bool) -> list[Row]:
         ),
         Row(
             "warm", "tiny scene in a warm process, no files", "bare `taylor_adaptive` + run", 2.0,
-            tiny.warm, Job(lambda folder, estimate: told([str(BARE / "tiny_warm.py"), str(_TIMES)])),
+            tiny.warm, lambda folder, estimate: told([SCRIPT, "warm", str(_TIMES)]),
         ),
     ]  # fmt: skip
 

@@ -1,18 +1,15 @@
 """The announced error of an averaged model, held against the full model."""
 
-import time
 from dataclasses import replace
 
 import numpy as np
 
 import rigidsim
 from experiments.coverage.families import CoverageScene
-from experiments.coverage.judging import MOST_STEPS, Judged, gone_through
+from experiments.coverage.judging import MOST_STEPS, Judged, compactly, gone_through
 from rigidsim.errors import ConfigError
 from rigidsim.scene.cautions import WarningCode
-from rigidsim.scene.config import Experiment
 from rigidsim.session.diagnostics import Diagnostics
-from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.status import Status
 
 _AXES = ("momentum_axis", "figure_axis")
@@ -22,24 +19,21 @@ def judge_average(scene: CoverageScene) -> Judged:
     """Run a scene averaged and in full; the axis whose announced error is nearest to the true one, or below
     it, stands for both.
     """
-    started = time.process_time()
     experiment = rigidsim.parse(scene.text, overrides=["output.record=['momentum_axis','figure_axis']"])
     model = experiment.config.model
     begin = Judged(scene.number, scene.family, str(model.level), "refused", scene.radians)
     try:
-        averaged = _compact(experiment)
+        averaged = compactly(experiment)
     except ConfigError:
-        return replace(begin, cpu_seconds=time.process_time() - started)
-    seen, progress, spent, _ = gone_through(averaged)
-    begin = replace(begin, ended=progress.status.value, steps=progress.steps, run_seconds=spent)
+        return begin
+    seen, progress, _ = gone_through(averaged)
+    begin = replace(begin, ended=progress.status.value, steps=progress.steps)
     if progress.status is not Status.FINISHED:
-        return replace(begin, cpu_seconds=time.process_time() - started)
-    before = time.process_time()
+        return begin
     found = Diagnostics(averaged, progress, seen.statistics).modelled(seen.trail)
-    estimated = time.process_time() - before
-    truth, progress, *_ = gone_through(_compact(experiment.having(['model.level="full"'])), 2 * MOST_STEPS)
+    truth, progress, _ = gone_through(compactly(experiment.having(['model.level="full"'])), 2 * MOST_STEPS)
     if progress.status is not Status.FINISHED or found.modelling is None:
-        return replace(begin, ended="no truth", cpu_seconds=time.process_time() - started)
+        return replace(begin, ended="no truth")
     announced = dict(zip(_AXES, (found.modelling.momentum_axis, found.modelling.figure_axis), strict=True))
     pairs = []
     for name in _AXES:
@@ -47,16 +41,4 @@ def judge_average(scene: CoverageScene) -> Judged:
         pairs.append((float(np.linalg.norm(apart, axis=1).max()), announced[name] or 0.0))
     true, said = max(pairs, key=lambda pair: pair[0] / max(pair[1], 1e-300))
     codes = {caution.code for caution in found.cautions()}
-    return replace(
-        begin,
-        true=true,
-        announced=said,
-        gone=WarningCode.MODEL_UNCERTAIN in codes,
-        estimate_seconds=estimated,
-        cpu_seconds=time.process_time() - started,
-    )
-
-
-def _compact(experiment: Experiment) -> InitialValueProblem:
-    prepared = prepare(experiment)
-    return replace(prepared, precision=replace(prepared.precision, compact=True))
+    return replace(begin, true=true, announced=said, gone=WarningCode.MODEL_UNCERTAIN in codes)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from experiments.random_scenes import Draw
+from experiments.random_scenes import Draw, orbit
 
 
 def rotors(draw: Draw, moments: Sequence[float]) -> None:
@@ -56,13 +56,7 @@ def gyrostat_in_flight(draw: Draw) -> None:
     draw.body(moments)
     distance, motion = draw.decades(1.5, 3), draw.between(0.05, 0.4)
     speed, tilt = motion * distance * draw.between(0.9, 1.1), draw.between(0, 3)
-    draw.start(
-        draw.direction() * draw.between(0.1, 2),
-        position=[distance, 0, 0],
-        velocity=[0, speed * math.cos(tilt), speed * math.sin(tilt)],
-    )
-    strength = motion**2 * distance**3 * draw.length**3 / draw.time**2
-    draw.load("central_gravity", f"gravitational_parameter = {strength!r}")
+    draw.fly(draw.direction() * draw.between(0.1, 2), distance, speed, tilt, motion**2 * distance**3)
     rotors(draw, moments)
 
 
@@ -86,12 +80,7 @@ def fluid_core(draw: Draw) -> None:
 
 
 def _orbit(draw: Draw) -> None:
-    axis_of_orbit, motion = 1e3 * draw.length, draw.between(0.05, 0.4) / draw.time
-    draw.load(
-        "gravity_gradient",
-        f"gravitational_parameter = {motion**2 * axis_of_orbit**3!r}",
-        f"orbit = {{semi_major_axis = {axis_of_orbit!r}, eccentricity = 0.1}}",
-    )
+    draw.source(1e3 * draw.length, draw.between(0.05, 0.4) / draw.time, 0.1)
 
 
 def state(draw: Draw, name: str, derivative: str, initial: float = 0.0) -> None:
@@ -180,12 +169,7 @@ def slosh(draw: Draw) -> None:
         components[k] = f"j{k}*({back} + c{k}*(swing{k} - w{axis}))"
     draw.load("torque", f"components = {components}".replace("'", '"'))
     if draw.sometimes(0.25):
-        axis_of_orbit, motion = 1e3 * draw.length, draw.between(0.05, 0.4) / draw.time
-        draw.load(
-            "gravity_gradient",
-            f"gravitational_parameter = {motion**2 * axis_of_orbit**3!r}",
-            f"orbit = {{semi_major_axis = {axis_of_orbit!r}, eccentricity = 0.1}}",
-        )
+        _orbit(draw)
 
 
 def laws(draw: Draw) -> None:
@@ -259,6 +243,5 @@ def magnetic(draw: Draw) -> None:
         "magnetic_dipole",
         f"moment = {moment}".replace("'", '"'),
         f"source_moment = [0, 0, {-field * axis**3 / 1e-7!r}]",
-        f"orbit = {{semi_major_axis = {axis!r}, eccentricity = 0.05, inclination = {draw.between(0.5, 2)!r}, "
-        f"period = {2 * math.pi / motion!r}}}",
+        orbit(axis, eccentricity=0.05, inclination=draw.between(0.5, 2), period=2 * math.pi / motion),
     )

@@ -12,7 +12,7 @@ import numpy as np
 from experiments.coverage import carried, fields, known, real_bodies, satellites
 from experiments.coverage.hyperbolic import HYPERBOLIC, hyperbolic_average
 from experiments.coverage.moments import put_late, spike, switch
-from experiments.random_scenes import KINDS, Draw
+from experiments.random_scenes import KINDS, Draw, orbit
 
 SAMPLES = 9
 _FORMULATIONS = ("quaternion", "quaternion", "rotation_matrix", "euler_angles", "canonical")
@@ -57,8 +57,12 @@ def _slow_body(draw: Draw) -> None:
     draw.load(
         "gravity_gradient",
         f"gravitational_parameter = {motion**2 * (1e3 * draw.length) ** 3 * draw.decades(-4, 0)!r}",
-        f"orbit = {{semi_major_axis = {1e3 * draw.length!r}, eccentricity = {draw.between(0, 0.6)!r}, "
-        f"inclination = {draw.between(0, 3)!r}, period = {2 * math.pi / motion!r}}}",
+        orbit(
+            1e3 * draw.length,
+            eccentricity=draw.between(0, 0.6),
+            inclination=draw.between(0, 3),
+            period=2 * math.pi / motion,
+        ),
     )
 
 
@@ -67,12 +71,8 @@ def _eccentric(draw: Draw) -> None:
     draw.body(np.array([1, 1 + draw.decades(-2, -0.5), 1 + draw.decades(-2, -0.4)]))
     draw.start(draw.direction() * draw.between(0.5, 3))
     axis, motion = 1e3 * draw.length, 1 / draw.time
-    draw.load(
-        "gravity_gradient",
-        f"gravitational_parameter = {motion**2 * axis**3!r}",
-        f"orbit = {{semi_major_axis = {axis!r}, eccentricity = {draw.between(0.01, 0.7)!r}, "
-        f"inclination = {draw.between(0, 3)!r}, mean_anomaly = {draw.between(0, 6)!r}}}",
-    )
+    e = draw.between(0.01, 0.7)
+    draw.source(axis, motion, e, inclination=draw.between(0, 3), mean_anomaly=draw.between(0, 6))
 
 
 def _late_instability(draw: Draw) -> None:
@@ -110,13 +110,8 @@ def _close_pass(draw: Draw) -> None:
     far = draw.between(3, 30) * 2 / (1 - eccentricity)  # from 3 lengths on at the pericentre
     speed = math.sqrt((1 - eccentricity) / far)
     tilt = draw.between(0, 3)
-    draw.start(
-        draw.direction() * draw.between(0.02, 1) * far**-1.5,
-        position=[far, 0, 0],
-        velocity=[0, speed * math.cos(tilt), speed * math.sin(tilt)],
-    )
+    draw.fly(draw.direction() * draw.between(0.02, 1) * far**-1.5, far, speed, tilt, 1.0)
     draw.time_scale = far**1.5
-    draw.load("central_gravity", f"gravitational_parameter = {draw.length**3 / draw.time**2!r}")
 
 
 def _attractors(draw: Draw) -> None:

@@ -1,8 +1,9 @@
 """Random scenes of bodies with a gravity field, and of oblate sources: on orbits, at rest, and in flight."""
 
 import math
+from collections.abc import Iterable
 
-from experiments.random_scenes import Draw
+from experiments.random_scenes import Draw, orbit
 
 
 def gravity_field(draw: Draw) -> None:
@@ -14,10 +15,7 @@ def gravity_field(draw: Draw) -> None:
     motion = draw.between(0.1, 1) / draw.time
     place = f"position = {[float(x * axis) for x in draw.direction()]}"
     if draw.sometimes(0.7):
-        place = (
-            f"orbit = {{semi_major_axis = {axis!r}, eccentricity = {draw.between(0, 0.3)!r}, "
-            f"inclination = {draw.between(0, 3)!r}, mean_anomaly = {draw.between(0, 6)!r}}}"
-        )
+        place = short_orbit(draw, axis, 0.3)
     lines = [place, f"degree = {degree}"]
     if draw.sometimes(0.3):
         pole = [float(x) for x in draw.direction()]
@@ -32,26 +30,31 @@ def gravity_field_in_flight(draw: Draw) -> None:
     degree = _field(draw)
     far, tilt = draw.between(3, 20), draw.between(0, 3)
     speed = draw.between(0.9, 1.1) / math.sqrt(far)
-    draw.start(
-        draw.direction() * draw.between(0.3, 3) * far**-1.5,
-        position=[far, 0, 0],
-        velocity=[0, speed * math.cos(tilt), speed * math.sin(tilt)],
-    )
+    draw.fly(draw.direction() * draw.between(0.3, 3) * far**-1.5, far, speed, tilt, 1.0, f"degree = {degree}")
     draw.time_scale = far**1.5
-    strength = draw.length**3 / draw.time**2
-    draw.load("central_gravity", f"gravitational_parameter = {strength!r}", f"degree = {degree}")
 
 
 def _field(draw: Draw) -> int:
     """Its degree; harmonics of a thousandth to a tenth of the body's own size."""
     degree = int(draw.random.integers(3, 6))
     size, zonal = draw.decades(-3, -1), draw.sometimes(0.2)
-    tables: dict[str, list[str]] = {"C": [], "S": []}
-    for n in range(3, degree + 1):
-        for m in range(1 if zonal else n + 1):
-            scale = size * math.sqrt(math.factorial(n - m) / math.factorial(n + m))
-            for table in ("C", "S")[: 1 + (m > 0)]:
-                tables[table].append(f'"{n},{m}" = {scale * draw.between(-1, 1)!r}')
-    given = ", ".join(f"{name} = {{{', '.join(keys)}}}" for name, keys in tables.items() if keys)
-    draw.lines.append(f"gravity_field = {{radius = {draw.length!r}, {given}}}")
+    orders = [(n, m) for n in range(3, degree + 1) for m in range(1 if zonal else n + 1)]
+    draw.lines.append(f"gravity_field = {{radius = {draw.length!r}, {harmonics(draw, size, orders)}}}")
     return degree
+
+
+def harmonics(draw: Draw, size: float, orders: Iterable[tuple[int, int]]) -> str:
+    """``C`` and ``S`` of such a size in the mean."""
+    tables: dict[str, list[str]] = {"C": [], "S": []}
+    for n, m in orders:
+        scale = size * math.sqrt(math.factorial(n - m) / math.factorial(n + m))
+        for table in ("C", "S")[: 1 + (m > 0)]:
+            tables[table].append(f'"{n},{m}" = {scale * draw.between(-1, 1)!r}')
+    return ", ".join(f"{name} = {{{', '.join(keys)}}}" for name, keys in tables.items() if keys)
+
+
+def short_orbit(draw: Draw, axis: float, widest: float, turn: float = 6) -> str:
+    """An orbit with an eccentricity up to the widest, inclined, and a mean anomaly up to a turn."""
+    eccentricity, inclination = draw.between(0, widest), draw.between(0, 3)
+    anomaly = draw.between(0, turn)
+    return orbit(axis, eccentricity=eccentricity, inclination=inclination, mean_anomaly=anomaly)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from experiments.random_scenes import Draw
+from experiments.random_scenes import Draw, orbit
 
 HYPERBOLIC = "hyperbolic averages"
 _TURN = 2 * math.pi
@@ -53,10 +53,16 @@ def hyperbolic_average(draw: Draw) -> None:
     draw.load(
         "gravity_gradient",
         f"gravitational_parameter = {distance**3 / draw.time**2!r}",
-        f"orbit = {{semi_major_axis = {distance!r}, period = {_TURN * draw.time!r}, "
-        f"eccentricity = {eccentricity!r}, inclination = {tilt!r}, ascending_node = {node!r}, "
-        f"periapsis = {draw.between(0, 6)!r}, mean_anomaly = {draw.between(0, 6)!r}, "
-        f"node_rate = {node_rate / draw.time!r}}}",
+        orbit(
+            distance,
+            period=_TURN * draw.time,
+            eccentricity=eccentricity,
+            inclination=tilt,
+            ascending_node=node,
+            periapsis=draw.between(0, 6),
+            mean_anomaly=draw.between(0, 6),
+            node_rate=node_rate / draw.time,
+        ),
     )
     level = "spin_averaged" if draw.sometimes(0.5) else "orbit_averaged"
     draw.more += ["[model]", f'level = "{level}"']

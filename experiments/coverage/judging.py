@@ -1,9 +1,9 @@
 """What a scene's run announces of its errors at the end, held against what is true there."""
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -13,6 +13,7 @@ from experiments.coverage import moments
 from experiments.coverage.families import SAMPLES, CoverageScene
 from rigidsim.errors import ConfigError
 from rigidsim.scene.cautions import WarningCode
+from rigidsim.scene.config import Experiment
 from rigidsim.session.diagnostics import Diagnostics
 from rigidsim.session.recorder import SampleStatistics
 from rigidsim.solve.assembly import Assembly, assemble, sampler
@@ -41,7 +42,6 @@ class Judged:
         warned: codes of the warnings but "digits are gone"; ``gone``: that one.
         drifting: invariants that are none: those of the better solution that drift by more than the root of
             their bound, which is far from rounding even where the energy has grown a thousandfold.
-        estimate_seconds, run_seconds: CPU, of the estimate and the integration.
     """
 
     number: int
@@ -57,9 +57,6 @@ class Judged:
     gone: bool = False
     warned: str = ""
     drifting: str = ""
-    estimate_seconds: float = 0.0
-    run_seconds: float = 0.0
-    cpu_seconds: float = 0.0
 
     @property
     def line(self) -> str:
@@ -111,35 +108,31 @@ class Kept(SampleReceiver):
 
 def judge(scene: CoverageScene) -> Judged:
     """Run a scene in memory, with its estimate, and then better."""
-    started = time.process_time()
     start = scene.text.partition("[initial]")[2].partition("[[")[0]
     recorded = ["quaternion"] + (["position"] if "position = " in start else [])
     asked = [f"output.record={recorded}".replace("'", '"')]
     begin = Judged(scene.number, scene.family, _setting(scene), "refused", scene.radians)
     try:
-        prepared = prepare(rigidsim.parse(scene.text, overrides=asked))
-        prepared = replace(prepared, precision=replace(prepared.precision, compact=True))
-        seen, progress, spent, parts = gone_through(prepared)
+        prepared = compactly(rigidsim.parse(scene.text, overrides=asked))
+        seen, progress, parts = gone_through(prepared)
     except ConfigError:
-        return replace(begin, cpu_seconds=time.process_time() - started)
-    begin = replace(begin, ended=progress.status.value, steps=progress.steps, run_seconds=spent)
+        return begin
+    begin = replace(begin, ended=progress.status.value, steps=progress.steps)
     if progress.status is not Status.FINISHED:
-        return replace(begin, cpu_seconds=time.process_time() - started)
-    before = time.process_time()
+        return begin
     found = Diagnostics(prepared, progress, seen.statistics).estimated(seen.trail, parts.corrected)
-    estimated = time.process_time() - before
     assert found.estimate is not None
     codes = [c.code for c in found.cautions()]
     truth, drifting = _truth(scene, asked, prepared)
     if truth is None:
-        return replace(begin, ended="no truth", cpu_seconds=time.process_time() - started)
+        return replace(begin, ended="no truth")
     announced = found.estimate.attitude
     places = (math.nan, math.nan)
     if "position" in recorded:
-        places = (_apart(seen.exact("position"), truth["position"]), found.estimate.position or 0.0)
+        places = (float(apart(seen.exact("position"), truth["position"])), found.estimate.position or 0.0)
     return replace(
         begin,
-        true=_angle(seen.exact("quaternion"), truth["quaternion"]),
+        true=angle(seen.exact("quaternion"), truth["quaternion"]),
         announced=math.nan if announced is None else announced,
         true_place=places[0],
         announced_place=places[1],
@@ -148,8 +141,6 @@ def judge(scene: CoverageScene) -> Judged:
             sorted({c.value for c in codes if c not in GONE and c is not WarningCode.NOT_JOINED})
         ),
         drifting=" ".join(drifting),
-        estimate_seconds=estimated,
-        cpu_seconds=time.process_time() - started,
     )
 
 
@@ -160,17 +151,18 @@ def _setting(scene: CoverageScene) -> str:
     )
 
 
-def gone_through(
-    prepared: InitialValueProblem, most: int = MOST_STEPS
-) -> tuple[Kept, Progress, float, Assembly]:
-    """Integrate, unless it takes too many steps: samples, how it ended, seconds of CPU, what did it."""
+def compactly(experiment: Experiment) -> InitialValueProblem:
+    """Prepared for equations that are compiled soon."""
+    prepared = prepare(experiment)
+    return replace(prepared, precision=replace(prepared.precision, compact=True))
+
+
+def gone_through(prepared: InitialValueProblem, most: int = MOST_STEPS) -> tuple[Kept, Progress, Assembly]:
+    """Integrate, unless it takes too many steps: samples, how it ended, what did it."""
     parts = assemble(prepared)
     seen = Kept(prepared, parts.evaluator)
     check: Callable[[Progress], Status | None] = lambda p: Status.MAX_STEPS if p.steps > most else None  # noqa: E731
-    loop = sampler(prepared, parts, seen, check)
-    before = time.process_time()
-    progress = loop.run()
-    return seen, progress, time.process_time() - before, parts
+    return seen, sampler(prepared, parts, seen, check).run(), parts
 
 
 def _truth(
@@ -197,9 +189,8 @@ def _truth(
         "integrator.hold_invariants=false",
     ]
     try:
-        found = prepare(rigidsim.parse(scene.text, overrides=[*asked, *better]))
-        found = replace(found, precision=replace(found.precision, compact=True))
-        seen, progress, *_ = gone_through(found, 2 * MOST_STEPS)
+        found = compactly(rigidsim.parse(scene.text, overrides=[*asked, *better]))
+        seen, progress, _ = gone_through(found, 2 * MOST_STEPS)
     except ConfigError:
         return None, []
     if progress.status is not Status.FINISHED:
@@ -256,22 +247,16 @@ def _integral_of_kink(end: mpmath.mpf, c: mpmath.mpf) -> mpmath.mpf:
     return c**3 / 3 + c**2 / 2 * (end - c) + (end - c) ** 3 / 6
 
 
-def _angle(one: Vectors, other: Vectors) -> float:
-    """Largest between attitudes, rad."""
-    largest = mpmath.mpf(0)
+def angle(one: Vectors, other: Vectors) -> float:
+    """Largest between attitudes, rad, up to the quaternions' sign; a norm off 1 counts."""
     with mpmath.workdps(60):
-        for p, q in zip(one, other, strict=True):
-            chord = min(mpmath.norm([a - s * b for a, b in zip(p, q, strict=True)]) for s in (1, -1))
-            largest = max(largest, 4 * mpmath.asin(min(chord / 2, mpmath.mpf(1))))
-    return float(largest)
+        chords = [
+            min(apart([p], [q]), apart([p], [[-x for x in q]])) for p, q in zip(one, other, strict=True)
+        ]
+        return math.pi if any(map(mpmath.isnan, chords)) else float(4 * mpmath.asin(min(max(chords) / 2, 1)))
 
 
-def _apart(one: Vectors, other: Vectors) -> float:
-    """Largest distance."""
-    with mpmath.workdps(60):
-        return float(
-            max(
-                mpmath.norm([a - b for a, b in zip(p, q, strict=True)])
-                for p, q in zip(one, other, strict=True)
-            )
-        )
+def apart(one: Vectors, other: Vectors) -> Any:
+    """Largest distance, mpf."""
+    pairs = zip(one, other, strict=True)
+    return max(mpmath.norm([mpmath.mpf(a) - b for a, b in zip(p, q, strict=True)]) for p, q in pairs)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from experiments.coverage.carried import state
-from experiments.random_scenes import Draw
+from experiments.random_scenes import Draw, across, orbit
 
 
 def _strings(values: list[str]) -> str:
@@ -15,11 +15,11 @@ def _strings(values: list[str]) -> str:
 
 
 def _orbit(draw: Draw, axis: float, motion: float, inclination: float, eccentricity: float) -> str:
-    return (
-        f"orbit = {{semi_major_axis = {axis!r}, eccentricity = {eccentricity!r}, "
-        f"inclination = {inclination!r}, ascending_node = {draw.between(0, 6)!r}, "
-        f"mean_anomaly = {draw.between(0, 6)!r}, period = {2 * math.pi / motion!r}}}"
-    )
+    node, anomaly = draw.between(0, 6), draw.between(0, 6)
+    return orbit(
+        axis, eccentricity=eccentricity, inclination=inclination, ascending_node=node, mean_anomaly=anomaly,
+        period=2 * math.pi / motion,
+    )  # fmt: skip
 
 
 def _sun(draw: Draw, axis: float, motion: float) -> None:
@@ -54,8 +54,7 @@ def shadow(draw: Draw) -> None:
     planet = ['name = "planet"', f"radius = {radius!r}", f"gravitational_parameter = {strength!r}"]
     if draw.sometimes(0.33):
         speed, tilt = motion * axis * draw.between(0.95, 1.05), draw.between(0, 0.5)
-        velocity = [0, speed * math.cos(tilt), speed * math.sin(tilt)]
-        draw.start(rates, position=[axis, 0, 0], velocity=velocity)
+        draw.start(rates, position=[axis, 0, 0], velocity=across(speed, tilt))
         draw.load("central_gravity", *planet)
     else:
         draw.start(rates)
@@ -71,11 +70,8 @@ def air(draw: Draw) -> None:
     draw.body(draw.moments())
     axis, motion = draw.decades(1.5, 3), draw.between(0.05, 0.4)
     speed, tilt = motion * axis * draw.between(0.98, 1.1), draw.between(0, 3)
-    draw.start(
-        draw.direction() * draw.between(0.1, 2),
-        position=[axis, 0, 0],
-        velocity=[0, speed * math.cos(tilt), speed * math.sin(tilt)],
-    )
+    rates = draw.direction() * draw.between(0.1, 2)
+    draw.start(rates, position=[axis, 0, 0], velocity=across(speed, tilt))
     low, unit = draw.between(0.5, 0.95) * axis * draw.length, draw.length / draw.time
     draw.load(
         "central_gravity",

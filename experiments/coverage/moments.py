@@ -48,45 +48,37 @@ def _log_cosh(u: Any) -> Any:
     return abs(u) + mpmath.log1p(mpmath.exp(-2 * abs(u))) - mpmath.log(2)
 
 
+def _of_atan(u: Any) -> Any:
+    return u * mpmath.atan(u) - mpmath.log1p(u * u) / 2
+
+
 def _softplus(u: Any) -> Any:
     return max(u, mpmath.mpf(0)) + mpmath.log1p(mpmath.exp(-abs(u)))
 
 
+def _broken(
+    text: str, impulse: float, order: int, *breaks: tuple[float, float], lasts: bool = False
+) -> Shape:
+    """A torque made of powers that begin at places u, times factors; its first integral has the order."""
+
+    def integral(u: Any, n: int) -> Any:
+        return sum(factor * _power(u - place, n) for place, factor in breaks)
+
+    return Shape(text, impulse, lambda u: integral(u, order), lambda u: integral(u, order + 1), lasts)
+
+
 _U = "((t - late)/width)"
 SWITCHES: dict[str, Shape] = {
-    "pulse": Shape(
-        "pulse(t, late, late + width)",
-        1.0,
-        lambda u: _power(u, 1) - _power(u - 1, 1),
-        lambda u: _power(u, 2) - _power(u - 1, 2),
+    "pulse": _broken("pulse(t, late, late + width)", 1.0, 1, (0, 1), (1, -1)),
+    "step": _broken("step(t - late)", 1.0, 1, (0, 1), lasts=True),
+    "sign": _broken("(sign(t - late) - sign(t - late - width))/2", 1.0, 1, (0, 1), (1, -1)),
+    "ramp": _broken(f"min(max({_U}, 0), 1)", 1.0, 2, (0, 1), (1, -1), lasts=True),
+    "triangle": _broken(f"max(0, 1 - abs({_U} - 1))", 1.0, 2, (0, 1), (1, -2), (2, 1)),
+    "two pulses": _broken(
+        "pulse(t, late, late + width) - pulse(t, late + 2*width, late + 5*width/2)", 0.5, 1,
+        (0, 1), (1, -1), (2, -1), (2.5, 1),
     ),
-    "step": Shape("step(t - late)", 1.0, lambda u: _power(u, 1), lambda u: _power(u, 2), lasts=True),
-    "sign": Shape(
-        "(sign(t - late) - sign(t - late - width))/2",
-        1.0,
-        lambda u: _power(u, 1) - _power(u - 1, 1),
-        lambda u: _power(u, 2) - _power(u - 1, 2),
-    ),
-    "ramp": Shape(
-        f"min(max({_U}, 0), 1)",
-        1.0,
-        lambda u: _power(u, 2) - _power(u - 1, 2),
-        lambda u: _power(u, 3) - _power(u - 1, 3),
-        lasts=True,
-    ),
-    "triangle": Shape(
-        f"max(0, 1 - abs({_U} - 1))",
-        1.0,
-        lambda u: _power(u, 2) - 2 * _power(u - 1, 2) + _power(u - 2, 2),
-        lambda u: _power(u, 3) - 2 * _power(u - 1, 3) + _power(u - 2, 3),
-    ),
-    "two pulses": Shape(
-        "pulse(t, late, late + width) - pulse(t, late + 2*width, late + 5*width/2)",
-        0.5,
-        lambda u: _power(u, 1) - _power(u - 1, 1) - _power(u - 2, 1) + _power(u - mpmath.mpf(5) / 2, 1),
-        lambda u: _power(u, 2) - _power(u - 1, 2) - _power(u - 2, 2) + _power(u - mpmath.mpf(5) / 2, 2),
-    ),
-}
+}  # fmt: skip
 SPIKES: dict[str, Shape] = {
     "exp": Shape(
         f"exp(-{_U}^2)",
@@ -96,15 +88,8 @@ SPIKES: dict[str, Shape] = {
     ),
     "cosh": Shape(f"1/cosh({_U})^2", 2.0, mpmath.tanh, _log_cosh),
     "tanh": Shape(f"1 - tanh({_U})^2", 2.0, mpmath.tanh, _log_cosh),
-    "1/(1 + u^2)": Shape(
-        f"1/(1 + {_U}^2)", 3.14, mpmath.atan, lambda u: u * mpmath.atan(u) - mpmath.log1p(u * u) / 2
-    ),
-    "width^2/(...)": Shape(
-        "width^2/(width^2 + (t - late)^2)",
-        3.14,
-        mpmath.atan,
-        lambda u: u * mpmath.atan(u) - mpmath.log1p(u * u) / 2,
-    ),
+    "1/(1 + u^2)": Shape(f"1/(1 + {_U}^2)", 3.14, mpmath.atan, _of_atan),
+    "width^2/(...)": Shape("width^2/(width^2 + (t - late)^2)", 3.14, mpmath.atan, _of_atan),
     "sigmoid": Shape(f"sigmoid({_U})*sigmoid(-{_U})", 1.0, lambda u: 1 / (1 + mpmath.exp(-u)), _softplus),
     "erf": Shape(
         f"erf({_U})",

@@ -2,6 +2,7 @@
 
 import math
 
+from experiments.coverage.fields import short_orbit
 from experiments.random_scenes import Draw
 
 _G = 6.67430e-11
@@ -46,9 +47,5 @@ def elastic(draw: Draw) -> None:
     draw.start(draw.direction() * spin * draw.time)
     if draw.sometimes(0.75):
         axis = 1e3 * draw.length
-        draw.load(
-            "gravity_gradient",
-            f"gravitational_parameter = {motion**2 * axis**3!r}",
-            f"orbit = {{semi_major_axis = {axis!r}, eccentricity = {draw.between(0, 0.3)!r}, "
-            f"inclination = {draw.between(0, 3)!r}, mean_anomaly = {draw.between(0, 2 * math.pi)!r}}}",
-        )
+        around = short_orbit(draw, axis, 0.3, 2 * math.pi)
+        draw.load("gravity_gradient", f"gravitational_parameter = {motion**2 * axis**3!r}", around)

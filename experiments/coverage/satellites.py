@@ -2,6 +2,7 @@
 
 import math
 
+from experiments.coverage.fields import harmonics, short_orbit
 from experiments.random_scenes import Draw
 
 _AU, _LIGHT = 149597870700.0, 299792458.0
@@ -36,10 +37,7 @@ def light(draw: Draw) -> None:
     far, motion = 1e3 * draw.length, draw.between(0.01, 0.2) / draw.time
     place = f"position = {[float(x * far) for x in draw.direction()]}"
     if draw.sometimes(0.6):
-        place = (
-            f"orbit = {{semi_major_axis = {far!r}, eccentricity = {draw.between(0, 0.3)!r}, "
-            f"inclination = {draw.between(0, 3)!r}, mean_anomaly = {draw.between(0, 6)!r}}}"
-        )
+        place = short_orbit(draw, far, 0.3)
     strength = f"gravitational_parameter = {motion**2 * far**3!r}"
     draw.load("gravity_gradient", 'name = "sun"', strength, place)
     pressure = draw.mass / draw.length / draw.time**2 * draw.decades(-3, -0.7)
@@ -51,14 +49,8 @@ def _flight(draw: Draw, far: float, *lines: str) -> float:
     """A start some lengths from the attractor; returns the speed in units."""
     rates = draw.decades(-0.5, 1)
     speed, tilt = draw.between(0.97, 1.1) / math.sqrt(far), draw.between(0, 3)
-    draw.start(
-        draw.direction() * rates * far**-1.5,
-        position=[far, 0, 0],
-        velocity=[0, speed * math.cos(tilt), speed * math.sin(tilt)],
-    )
+    draw.fly(draw.direction() * rates * far**-1.5, far, speed, tilt, 1.0, *lines)
     draw.time_scale = far**1.5
-    strength = draw.length**3 / draw.time**2
-    draw.load("central_gravity", f"gravitational_parameter = {strength!r}", *lines)
     return speed
 
 
@@ -94,11 +86,7 @@ def eddy_currents(draw: Draw) -> None:
     field = [f"field = {[float(x) for x in draw.direction()]}"]
     if draw.sometimes(0.6):
         far, motion = 1e3 * draw.length, draw.between(0.02, 0.4) / draw.time
-        orbit = [
-            f"gravitational_parameter = {motion**2 * far**3!r}",
-            f"orbit = {{semi_major_axis = {far!r}, eccentricity = {draw.between(0, 0.4)!r}, "
-            f"inclination = {draw.between(0, 3)!r}, mean_anomaly = {draw.between(0, 6)!r}}}",
-        ]
+        orbit = [f"gravitational_parameter = {motion**2 * far**3!r}", short_orbit(draw, far, 0.4)]
         field = [f"source_moment = {[float(x) * 1e7 * far**3 for x in draw.direction()]}", *orbit]
         if draw.sometimes(0.5):
             draw.load("gravity_gradient", *orbit)
@@ -125,16 +113,9 @@ def _figure(draw: Draw, radius: float) -> str:
 def _field(draw: Draw, radius: float, far: float, *, zonal: bool) -> str:
     """Degrees 2 (without its zonal part beside a figure) to 4."""
     size = draw.decades(-4, -2)
-    tables: dict[str, list[str]] = {"C": [], "S": []}
-    for n in range(2, 5):
-        for m in range(n + 1):
-            if (n, m) == (2, 0) and not zonal:
-                continue
-            scale = size * math.sqrt(math.factorial(n - m) / math.factorial(n + m))
-            for table in ("C", "S")[: 1 + (m > 0)]:
-                tables[table].append(f'"{n},{m}" = {scale * draw.between(-1, 1)!r}')
+    orders = [(n, m) for n in range(2, 5) for m in range(n + 1) if zonal or (n, m) != (2, 0)]
+    given = harmonics(draw, size, orders)
     rate = draw.between(0.1, 3) * far**-1.5 / draw.time if draw.sometimes(0.6) else 0.0
-    given = ", ".join(f"{name} = {{{', '.join(keys)}}}" for name, keys in tables.items())
     pole = [float(x) for x in draw.direction()]
     turning = f"pole = {pole}, rate = {rate!r}, prime_meridian = {draw.between(0, 6)!r}"
     return f"{{radius = {radius!r}, {given}, {turning}}}"

@@ -12,7 +12,7 @@ from typing import Any
 import mpmath
 
 import rigidsim
-from experiments.coverage.judging import Kept, gone_through
+from experiments.coverage.judging import Kept, angle, apart, gone_through
 from experiments.extremes.scenes import Extreme
 from rigidsim.accuracy.error_law import round_off_law
 from rigidsim.errors import ConfigError
@@ -109,7 +109,7 @@ def _largest_error(scene: Extreme, column: str, prepared: InitialValueProblem, s
     with mpmath.workdps(_DIGITS + 20):
         exact = [form.exactly(time, _DIGITS) for time in samples.times]
         if column != "rates":
-            return float(max(_angle(row, q) for row, (_, q) in zip(rows, exact, strict=True)))
+            return angle(rows, [q for _, q in exact])
         inertia = [[mpmath.mpf(x) for x in row] for row in prepared.scene.body.inertia]
         rates = [w for w, _ in exact]
         momenta = [[[mpmath.fdot(r, w) for r in inertia] for w in part] for part in (rows, rates)]
@@ -134,17 +134,9 @@ def reference(scene: Extreme) -> ClosedForm:
     return _known[text]
 
 
-def _angle(one: Sequence[Any], other: Sequence[Any]) -> Any:
-    """Rotation angle between two attitudes, up to the quaternions' sign, rad; a norm off 1 counts."""
-    chord = min(mpmath.norm([a - s * b for a, b in zip(one, other, strict=True)]) for s in (1, -1))
-    return mpmath.pi if mpmath.isnan(chord) else 4 * mpmath.asin(min(chord / 2, mpmath.mpf(1)))
-
-
 def _relative(found: Sequence[Any], exact: Sequence[Any]) -> Any:
     """Largest difference over the largest size, of vectors at all samples."""
     size = max(mpmath.norm(x) for x in exact)
-    far = [
-        mpmath.norm([a - b for a, b in zip(*pair, strict=True)]) for pair in zip(found, exact, strict=True)
-    ]
-    largest = mpmath.inf if any(mpmath.isnan(x) for x in far) else max(far)
+    far = [apart([one], [other]) for one, other in zip(found, exact, strict=True)]
+    largest = mpmath.inf if any(map(mpmath.isnan, far)) else max(far)
     return largest / size if size else largest

@@ -13,9 +13,8 @@ from typing import Any
 
 import mpmath
 
-import rigidsim
 from experiments.peers.curves import Point, angle
-from experiments.peers.scenes import SCENES, Scene
+from experiments.peers.scenes import SCENES
 
 BARE, OURS = "heyoka", "rigidsim"
 _SLOW = 0.3  # CPU seconds; measured in the first repeat alone
@@ -118,10 +117,7 @@ def _note(
         if key not in measured.points:
             error = angle(record["quaternion"], truths[case])
             measured.points[key] = Point(peer, record["title"], *case, record["knob"], error)
-        point = measured.points[key]
-        point.seconds.append(record["seconds"])
-        point.whole.append(record["whole"])
-        point.prepare.append(record["prepare"])
+        measured.points[key].seconds.append(record["seconds"])
         if record["whole"] > _SLOW and peer not in (BARE, OURS):
             slow.add(key)
     if note and note not in measured.notes:
@@ -135,13 +131,3 @@ def reference(name: str, end: float) -> list[Any]:
 
     with mpmath.workdps(50):
         return [mpmath.fsum(parts) for parts in integrated(SCENES[name], end)]
-
-
-def closed_form(scene: Scene, end: float) -> list[Any] | None:
-    """The final quaternion in closed form to 34 digits; None where there is none."""
-    from rigidsim.solve.closed_form import find_closed_form
-    from rigidsim.solve.problem import prepare
-
-    prepared = prepare(rigidsim.parse(scene.config(end), overrides=["integrator.precision=40"]))
-    form = find_closed_form(prepared.scene)
-    return None if form is None else list(form.exactly(mpmath.mpf(end), 34)[1])

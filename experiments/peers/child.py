@@ -57,16 +57,14 @@ def thinned(knobs: Sequence[float], stride: int) -> Sequence[float]:
 
 
 def measure(prepare: Callable[[], Callable[[], Any]], fill: float, fewest: int = 2) -> dict[str, Any]:
-    """CPU seconds of preparing, of the fastest integration, and of the fastest whole call.
+    """CPU seconds of the fastest integration, and of the fastest whole call.
 
     Args:
         prepare: returns the function to be timed.
         fill: CPU seconds of calls to choose the fastest from.
         fewest: calls at least, but of slow ones.
     """
-    started = time.process_time()
     solve = prepare()
-    prepared = time.process_time() - started
     fastest, whole, spent, quaternion = math.inf, math.inf, 0.0, []
     for number in range(_MOST_CALLS):
         started = time.process_time()
@@ -78,7 +76,7 @@ def measure(prepare: Callable[[], Callable[[], Any]], fill: float, fewest: int =
         spent += elapsed
         if elapsed > _PATIENCE or (spent > fill and number + 1 >= fewest):
             break
-    return {"prepare": prepared, "seconds": fastest, "whole": whole, "quaternion": quaternion}
+    return {"seconds": fastest, "whole": whole, "quaternion": quaternion}
 
 
 def emit(**record: Any) -> None:

@@ -17,7 +17,7 @@ class Point:
     """One setting of one peer on one scene.
 
     Attributes:
-        seconds: CPU of the integration, one per process; ``whole`` of the whole call.
+        seconds: CPU of the integration, one per process.
         error: angle to the reference at the end, rad.
     """
 
@@ -28,8 +28,6 @@ class Point:
     knob: float
     error: float
     seconds: list[float] = field(default_factory=list)
-    whole: list[float] = field(default_factory=list)
-    prepare: list[float] = field(default_factory=list)
 
     @property
     def cost(self) -> float:

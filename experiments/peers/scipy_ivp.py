@@ -1,17 +1,18 @@
-"""scipy's solve_ivp: DOP853 and LSODA, with the right-hand side in Python and, where numba is, compiled."""
+"""scipy's solve_ivp: DOP853 and LSODA, with the right-hand side compiled by numba."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numba
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from experiments.peers.compiled import right_hand_side
 from experiments.peers.scenes import Scene
 
 TITLES = {
-    "dop853": "scipy DOP853, Python",
-    "dop853_compiled": "scipy DOP853, numba",
-    "lsoda_compiled": "scipy LSODA, numba",
+    "dop853": "scipy DOP853, numba",
+    "lsoda": "scipy LSODA, numba",
 }
 _functions: dict[str, Any] = {}
 
@@ -21,44 +22,7 @@ def knobs(variant: str, scene: Scene) -> list[float]:
     return [10.0**-n for n in (4, 6, 8, 10, 12, 13)]
 
 
-def _plain(scene: Scene) -> Callable[[float, Any], Any]:
-    """The equations of ``compiled`` in Python floats, which beat numpy's scalars for seven states."""
-    a, b, c = scene.moments
-    weight, n = scene.weight, scene.orbit_rate
-
-    def function(t: float, state: Any) -> Any:
-        p, q, r, w, x, y, z = state.tolist()
-        dp, dq, dr = (b - c) / a * q * r, (c - a) / b * r * p, (a - b) / c * p * q
-        if weight:
-            dp += weight / a * 2.0 * (y * z + w * x)
-            dq -= weight / b * 2.0 * (x * z - w * y)
-        if n:
-            k = 3 * n * n
-            rx = w * w + x * x - y * y - z * z
-            ry, rz = 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
-            dp += k * (c - b) / a * ry * rz
-            dq += k * (a - c) / b * rz * rx
-            dr += k * (b - a) / c * rx * ry
-        return np.array(
-            [
-                dp,
-                dq,
-                dr,
-                -0.5 * (x * p + y * q + z * r) + n / 2 * z,
-                0.5 * (w * p + y * r - z * q) + n / 2 * y,
-                0.5 * (w * q + z * p - x * r) - n / 2 * x,
-                0.5 * (w * r + x * q - y * p) - n / 2 * w,
-            ]
-        )
-
-    return function
-
-
 def _compiled(scene: Scene) -> Callable[[float, Any], Any]:
-    import numba
-
-    from experiments.peers.compiled import right_hand_side
-
     inner = right_hand_side(scene)
 
     @numba.njit
@@ -73,16 +37,14 @@ def _compiled(scene: Scene) -> Callable[[float, Any], Any]:
 
 def prepare(scene: Scene, end: float, variant: str, knob: float) -> Callable[[], Sequence[float]]:
     """See ``experiments.peers``."""
-    method, _, compiled = variant.partition("_")
-    key = scene.name + compiled
-    if key not in _functions:
-        _functions[key] = _compiled(scene) if compiled else _plain(scene)
-    function, start = _functions[key], np.array(scene.start)
+    if scene.name not in _functions:
+        _functions[scene.name] = _compiled(scene)
+    function, start = _functions[scene.name], np.array(scene.start)
 
     def solve() -> Sequence[float]:
-        result = solve_ivp(function, (0.0, end), start, method.upper(), t_eval=[end], rtol=knob, atol=knob)
+        result = solve_ivp(function, (0.0, end), start, variant.upper(), t_eval=[end], rtol=knob, atol=knob)
         if not result.success:
-            raise RuntimeError(f"scipy {method} at tolerance {knob:g}: {result.message}")
+            raise RuntimeError(f"scipy {variant} at tolerance {knob:g}: {result.message}")
         return scene.from_orbital(result.y[3:7, -1].tolist(), end)
 
     return solve

@@ -1,38 +1,23 @@
-"""The campaign of kills, full disks and damages: it can fail, tells on the way, and finds nothing lost."""
+"""The campaigns of kills and of announced errors: sweeps lose nothing, and a broken promise is found."""
 
 import random
+import time
 from pathlib import Path
 
 import pytest
 
-import rigidsim
 from experiments import error_coverage
 from experiments.coverage.judging import Judged
 from experiments.durability.judging import Tally
-from experiments.durability.scenes import text_of
-from experiments.sweep_kill_campaign import WAYS, campaign
-from rigidsim.store.folder import RunFolder
-
-SHORT = text_of("double_driven").replace("end = 3000", "end = 30").replace("3001", "31")
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
-    return rigidsim.run(rigidsim.parse(SHORT), out=tmp_path_factory.mktemp("runs")).folder
-
-
-# ---- the campaign of kills over sweeps, shortened
+from experiments.durability.sweeps import WAYS, disturb_sweeps
 
 
 @pytest.mark.slow  # a sweep for each kill
 def test_a_few_disturbances_of_each_kind_lose_nothing(tmp_path: Path) -> None:
     tally = Tally()
-    campaign(tally, 4, random.Random(3), tmp_path, 600)
+    disturb_sweeps(tally, 4, random.Random(3), tmp_path, time.monotonic() + 600)
     assert tally.failures == []
     assert sum(tally.counts[way] for way in WAYS) >= 4
-
-
-# ---- the coverage campaign: it goes on where it stopped, and a share of it keeps what estimates promise
 
 
 def judged(true: float, announced: float, *, gone: bool = False, number: int = 0) -> Judged:
@@ -48,6 +33,3 @@ def test_broken_promises_are_found() -> None:
     assert any("digits said to be gone" in line and "[201]" in line for line in alarmed)
     wide = [judged(1e-12, 1e-9, number=n) for n in range(200)]
     assert any("median announced over true" in line for line in error_coverage.broken_promises(wide))
-
-
-# ---- the certificates' study finds what it should, and would find a certificate that lies

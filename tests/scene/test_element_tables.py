@@ -71,10 +71,6 @@ def test_a_bad_table_is_refused_with_its_line(which: str) -> None:
     assert says in str(caught.value)
 
 
-# eccentricities that leap about from row to row: what is between them means nothing
-LEAPING = "time [day], semi_major_axis [au], eccentricity\n" + "\n".join(
-    f"{10 * i}, 1, {0.1 * (7 * i % 5)}" for i in range(12)
-)
 REFUSED = {
     "no such table": (CONFIG % "", "was given as text, without files next to it"),
     "a column twice": (with_table(rows(), ', semi_major_axis = "1 au"'), "given in the config, too"),

@@ -10,7 +10,7 @@ import pytest
 
 from experiments.bare import blocks
 from experiments.closed_forms import free_top
-from experiments.toutatis import MOMENTS, PUBLISHED, RATES
+from experiments.spectral_lines import MOMENTS, PUBLISHED, RATES
 from rigidsim import parse
 from rigidsim.errors import ConfigError
 from rigidsim.scene.bodies.presets import FOLDER, PRESETS
@@ -137,10 +137,10 @@ def test_toutatis_has_both_periods() -> None:
     assert close(x / z, "3.09")
     assert close(y / z, "3.22")
     assert [exact(m) for m in MOMENTS] == [exact("3.09"), exact("3.22"), 1]
-    assert RATES == ("20.7", "31.3", "98.0")
+    assert [rate.split()[0] for rate in PRESETS["toutatis"].rotation] == RATES
     rates = [float(parse_number(rate, "rad/s")) for rate in PRESETS["toutatis"].rotation]
     top = free_top([float(m) for m in toutatis.principal_moments], rates)
-    assert float(top.period) / DAY == pytest.approx(PUBLISHED["rotation"], rel=0.01)
+    assert float(top.period) / DAY == pytest.approx(PUBLISHED["wobble"], rel=0.01)
     assert float(2 * mpmath.pi / top.precession) / DAY == pytest.approx(PUBLISHED["precession"], rel=0.01)
 
 

@@ -98,7 +98,6 @@ T2029, POLE = Fraction(924083160), ("initial.quaternion=[1, 0, 0, 0]", "initial.
 UTC = "2020-04-13T21:46:00 UTC"  # known to a double of seconds
 SLOW = ('initial.angular_velocity=["1e-8 rad/s", "2e-8 rad/s", "2.6e-6 rad/s"]', 'time.end="3652 day"',
         'time.epoch="1985-06-28T00:00:00 TDB"')  # fmt: skip
-KINKS = 'loads=[{kind = "torque", components = ["0.01*abs(sin(t/10))", "0", "0"]}]'
 TURNED = Rotation.from_rotvec([np.radians(84381.406 / 3600), 0, 0])
 
 
