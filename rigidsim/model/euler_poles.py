@@ -8,7 +8,7 @@ vanishes neither is defined. What R tells to rounding there is the turn about th
 
 So near a pole the last angle is what the first one leaves of this turn, and the error of the first moves R by
 no more than e. In the pole itself the first has the value of the start here; what is recorded keeps the one
-of the sample before (``rigidsim.solve.turns.joined``).
+of the sample before (``rigidsim.solve.turns``).
 """
 
 from __future__ import annotations

@@ -12,7 +12,6 @@ import rigidsim.model.partial_invariants  # noqa: F401  (enters what it defines 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.euler_poles import Poles
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.observables import Steady
 from rigidsim.model.observables.own_states import own_observables
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
@@ -39,7 +38,6 @@ class Recorded:
     continuity: str = ""
     squared_sizes: list[Symbolic] = field(default_factory=list)  # vanish where angles are undefined
     poles: Poles | None = None  # for Euler angles that are functions of the state
-    steady: Steady | None = None  # how these angles advance between samples, if known
     attributes: Mapping[str, str] = field(default_factory=dict)  # besides units, long name and frame
 
 
@@ -77,7 +75,7 @@ def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list
         sizes = [] if x.angles is None else [angle.squared_size for angle in x.angles(m)]
         variable = Recorded(
             x.name, x.dims, x.units, x.long_name, x.frame, len(outputs), count, x.unit_exponents(m, count),
-            x.conserved(m) is not None, x.continuity(m), sizes, x.poles(m), x.steady(m), x.attributes(m),
+            x.conserved(m) is not None, x.continuity(m), sizes, x.poles(m), x.attributes(m),
         )  # fmt: skip
         recorded.append(variable)
         outputs += components

@@ -215,12 +215,10 @@ class Diagnostics:
         lost = self.statistics.angles_wrapped_from
         if not math.isnan(lost):
             names = [r.name for r in system.recorded if r.continuity == "unwrap"]
-            carried = names == ["euler_angles"]
-            other = ', or choose formulation = "euler_angles", which carries them' if carried else ""
             yield Caution(
                 WarningCode.NOT_JOINED,
                 f"the turns of {' and '.join(names)} aren't known from {self._words.moment(lost, 6)} on, "
-                f"where they are recorded within one turn; sample more often{other}",
+                'where they are recorded within one turn; sample more often, or choose method = "taylor"',
             )
         if joined and turns > 1:
             yield Caution(

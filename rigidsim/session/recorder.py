@@ -3,7 +3,6 @@
 Statistics over all samples let the end of a run be judged without reading them again.
 """
 
-import copy
 import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -133,13 +132,16 @@ class Checkpoints:
     def __init__(self, parts: Assembly, **others: SavedPart) -> None:
         self._precision, self._system = parts.prepared.precision, parts.prepared.system
         self._corrected, self._log = parts.corrected, parts.log
+        self._rows = parts.evaluator.angles.rows(parts.prepared.clock)
         self._parts: dict[str, SavedPart] = {"continuity": parts.evaluator, **others}
         self._versions = self._corrected.versions | {name: part.version for name, part in self._parts.items()}
 
     def packed(self, position: Position) -> Arrays:
         """Everything at a position, as arrays."""
         arrays = self._corrected.pack(position.boundary)
-        arrays["counts"] = np.append(arrays["counts"], position.next_sample)
+        samples = self._rows.samples(position.next_row)
+        arrays["counts"] = np.append(arrays["counts"], samples)
+        arrays["rows_between"] = np.array([position.next_row - self._rows.row(samples - 1) if samples else 0])
         for part in self._parts.values():
             arrays |= part.pack()
         return arrays | pack_versions(self._versions)
@@ -153,18 +155,19 @@ class Checkpoints:
         try:
             arrays = netcdf.read_group(chain.paths[-1], "checkpoint")
             check_versions(arrays, self._versions)
-            boundary, next_sample = self._corrected.unpack(arrays), int(numbers(arrays, "counts", 3)[2])
+            boundary, samples = self._corrected.unpack(arrays), int(numbers(arrays, "counts", 3)[2])
             for part in self._parts.values():
                 part.restore(arrays)
             for path in chain.paths:
                 if "previous_seal" in netcdf.root_attributes(path):
                     saved = netcdf.read_group(path, "events")
                     self._log.found += unpack_events(saved, self._precision, len(self._system.states))
-            if boundary.mark.events != len(self._log.found) or next_sample != chain.rows:
+            if boundary.mark.events != len(self._log.found) or samples != chain.rows:
                 raise ValueError("its counts don't agree with what the segments hold")
         except (KeyError, ValueError) as error:
             raise RunFolderError(f"{chain.paths[-1]}: cannot be resumed from: {error}") from None
-        return Position(boundary, next_sample)
+        between = int(arrays.get("rows_between", np.ones(1))[0])
+        return Position(boundary, self._rows.row(samples - 1) + between if samples else 0)
 
 
 class Recorder(SampleReceiver):
@@ -195,25 +198,22 @@ class Recorder(SampleReceiver):
         self._max_drift = None if guard is None else float(guard)
         self.statistics = statistics
         self.trail = trail
-        self._note_lost_turns()
+        if evaluator.angles.lost:
+            self.statistics.angles_wrapped_from = prepared.clock.seconds(prepared.clock.at(1))
 
     def take(self, block: SampleBlock) -> None:
         """Evaluate and collect samples, up to the first past the guard ``max_drift``."""
         tangents = self.sensitivity  # first of all, because Ctrl-C may end it
         place = None if tangents is None else tangents.place
         beside = {} if tangents is None else tangents.take(block)
-        before = (
-            self._evaluator.continuity
-            if self._max_drift is None
-            else copy.deepcopy(self._evaluator.continuity)
-        )
+        before = self._evaluator.last_quaternion
         recorded = self._evaluator.evaluate(block)
         put_back = put_back_by_invariant(self._prepared.projected_scalars, block.put_back)
         wanted = self._wanted(recorded, put_back)
         if wanted <= len(block):
             self.last_wanted = block.first + wanted - 1
         if wanted < len(block):
-            self._evaluator.continuity = before
+            self._evaluator.last_quaternion = before
             block = block.rows(0, wanted)
             recorded = self._evaluator.evaluate(block)
             put_back = {name: values[:wanted] for name, values in put_back.items()}
@@ -236,15 +236,10 @@ class Recorder(SampleReceiver):
         for name, values in put_back.items():
             recorded[put_back_name(name)] = [values[:, None]]
             self.statistics.put_back[name] = float(values[-1])
-        self._note_lost_turns()
         factors = self._evaluator.singular_factors(block.states, block.chart)
         if factors is not None:
             self.statistics.see_singular(factors, recorded["time"][0])
         self._writer.add(recorded)
-
-    def _note_lost_turns(self) -> None:
-        lost = self._evaluator.continuity.wrapped_from
-        self.statistics.angles_wrapped_from = lost * self._prepared.clock.unit
 
     def _wanted(self, recorded: RecordedParts, put_back: Mapping[str, np.ndarray]) -> int:
         """Number of samples up to and including the first past the drift guard; more than all if none is.

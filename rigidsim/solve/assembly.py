@@ -1,6 +1,6 @@
 """Assembly of what solves a prepared scene: stepper, effects, evaluation."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from rigidsim.solve.compiled import interruptible
 from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper, Position
@@ -16,16 +16,10 @@ from rigidsim.solve.events import EventLog
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import Projection, steps_between
 from rigidsim.solve.sampler import MEASURED, Check, Pacing, Progress, SampleReceiver
-from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.solvers.algorithm import Algorithm
 from rigidsim.solve.solvers.taylor import Taylor
-from rigidsim.solve.status import Status
 from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.taylor_stepper import TaylorStepper
-from rigidsim.solve.turns.count import MOST_OF_A_CLOSED_FORM, radians_between
-
-_RADIANS_AT_ONCE = 5e4
-_PATIENCE = 0.1  # seconds, in place of the usual patience
 
 
 @dataclass
@@ -71,10 +65,7 @@ def _assembled(prepared: InitialValueProblem, stride: int) -> Assembly:
         lambda: wrapping.angles,
     )
     corrected = _stepping(prepared, prepared.algorithm, wrapping, log, stride)
-    countable = not system.turning  # samples alone can't tell what such a load does
-    if not prepared.has_steps:
-        countable = radians_between_samples(prepared) <= MOST_OF_A_CLOSED_FORM
-    evaluator = Evaluator(system, precision, wrapping, countable=countable)
+    evaluator = Evaluator(system, precision, wrapping, has_steps=prepared.has_steps)
     return Assembly(prepared, stride, wrapping, log, corrected, evaluator)
 
 
@@ -102,11 +93,6 @@ def _stepping(
     return CorrectedStepper(stepper, [*effects, Waypoints()], stride=stride)
 
 
-def radians_between_samples(prepared: InitialValueProblem) -> float:
-    """Largest angle by which the body turns between neighbouring samples, rad."""
-    return radians_between(prepared.scene.samples, float(prepared.system.rate_bound))
-
-
 def sampler(
     prepared: InitialValueProblem,
     parts: Assembly,
@@ -118,39 +104,5 @@ def sampler(
     progress: Progress | None = None,
 ) -> Driver:
     """What takes a prepared scene through its samples."""
-    clock = prepared.clock
-    if parts.evaluator.sparse:
-        check = _following(check, parts.evaluator, clock)
-        pacing = _in_small_blocks(pacing, radians_between_samples(prepared))
-    solver = prepared.algorithm.solver(parts.corrected, pacing)
-    return Driver(solver, clock, receiver, check, start, pacing, most_steps, progress)
-
-
-def _following(check: Check, evaluator: Evaluator, clock: SampleClock) -> Check:
-    """The check, and turns counted up to where the run is, for a part of a chunk's time each call."""
-
-    def checked(progress: Progress) -> Status | None:
-        stop = check(progress)
-        if stop is not None or progress.next_sample >= clock.count:
-            return stop
-        reached = progress.time / clock.unit
-        try:
-            evaluator.follow(min(reached, float(clock.at(progress.next_sample))))
-        except KeyboardInterrupt:  # while what follows them was compiled
-            stop = check(progress)
-            if stop is None:
-                raise
-            return stop
-        return check(progress)
-
-    return checked
-
-
-def _in_small_blocks(pacing: Pacing, radians: float) -> Pacing:
-    """Pacing with blocks so small that turns within one are counted in a fraction of a second."""
-    rows = max(1, int(_RADIANS_AT_ONCE / radians))
-    return replace(
-        pacing,
-        patience=min(pacing.patience, _PATIENCE),
-        rows_at_once=min(pacing.rows_at_once, rows),
-    )
+    solver, angles = prepared.algorithm.solver(parts.corrected, pacing), parts.evaluator.angles
+    return Driver(solver, prepared.clock, angles, receiver, check, start, pacing, most_steps, progress)

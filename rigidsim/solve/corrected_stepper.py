@@ -38,8 +38,8 @@ class StepBoundary:
 class Position:
     """Position from which a run continues with the same bits."""
 
-    boundary: StepBoundary  # a step boundary past all samples before ``next_sample``
-    next_sample: int  # index of the first sample that isn't handed over
+    boundary: StepBoundary  # a step boundary past all rows before ``next_row``
+    next_row: int  # the first row (``sampling.Rows``) that isn't handed over
 
 
 _NEAR = 3  # number of steps up to which they are sooner taken one by one than together

@@ -7,6 +7,7 @@ from rigidsim.solve.sampler import MEASURED, Check, Pacing, Progress, SampleBuff
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.solvers.solver import Solver
 from rigidsim.solve.status import Status
+from rigidsim.solve.turns import JoinedAngles
 
 
 class Driver:
@@ -19,6 +20,7 @@ class Driver:
         self,
         solver: Solver,
         clock: SampleClock,
+        angles: JoinedAngles,
         receiver: SampleReceiver,
         check: Check,
         start: Position | None = None,
@@ -26,11 +28,11 @@ class Driver:
         most_steps: int | None = None,
         progress: Progress | None = None,
     ) -> None:
-        first = 0 if start is None else start.next_sample
+        first = 0 if start is None else start.next_row
         self.solver, self.clock, self.receiver, self.check = solver, clock, receiver, check
-        self.progress = progress or Progress(clock.count)
-        self.progress.next_sample = first
-        self.buffer = SampleBuffer(clock, receiver, pacing, first)
+        self.progress, self.rows = progress or Progress(clock.count), angles.rows(clock)
+        self.progress.next_sample = self.rows.samples(first)
+        self.buffer = SampleBuffer(self.rows, angles, receiver, pacing, first)
         self._most_steps = most_steps
         solver.begin(clock, self.buffer, self.progress, None if start is None else start.boundary)
 
@@ -98,7 +100,7 @@ class Driver:
             self._back_to(self.buffer.boundary or self.solver.boundary(), self.buffer.handed)
             return self._asked_to_end(signal)
         finally:
-            self.progress.next_sample = self.buffer.handed
+            self.progress.next_sample = self.rows.samples(self.buffer.handed)
         if refused is None:
             return None
         index, boundary = refused

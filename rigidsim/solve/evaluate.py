@@ -1,7 +1,5 @@
 """Evaluation of recorded variables from states at sample times, compiled and in the run's own precision."""
 
-import copy
-import math
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import ClassVar
@@ -18,7 +16,7 @@ from rigidsim.solve.effects.angle_wrapping import AngleWrapping
 from rigidsim.solve.effects.charts import AngleContinuation
 from rigidsim.solve.precision import Precision
 from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.turns.joined import Continuity, JoinedAngles
+from rigidsim.solve.turns import Continuity, JoinedAngles
 
 RecordedParts = dict[str, list[np.ndarray]]
 """Float64 parts (n, components) by variable, whose sum is the value in SI (``Precision.parts``)."""
@@ -42,8 +40,6 @@ class _PartnerChart:
         self._angles = slice(found[0], found[0] + 3) if found else None
         self._outputs = compiled(partner.outputs)
         self.singular = compiled([partner.singular_factor])
-        sizes = [size for r in partner.recorded for size in r.squared_sizes]
-        self.sizes = compiled(sizes) if sizes else None
 
     def values(
         self, block: SampleBlock, initial: np.ndarray, wrapping: AngleWrapping
@@ -76,12 +72,17 @@ class _PartnerChart:
 
 
 class Evaluator:
-    """Evaluates a system's outputs on blocks of states; angles are followed if they are ``countable``."""
+    """Evaluates a system's outputs on blocks of states.
 
-    version: ClassVar[int] = 1
+    Attributes:
+        angles: follows the angles that are joined from sample to sample, before they are evaluated here.
+        last_quaternion: what the next sample's is joined to; None before the first.
+    """
+
+    version: ClassVar[int] = 2
 
     def __init__(
-        self, system: System, precision: Precision, wrapping: AngleWrapping, *, countable: bool = True
+        self, system: System, precision: Precision, wrapping: AngleWrapping, *, has_steps: bool = True
     ) -> None:
         self._system = system
         self._precision = precision
@@ -95,9 +96,8 @@ class Evaluator:
         self.initial = initial[:0] if begun is None else begun[:, 0]
         self._parameters = len(components)
         self.code = self._invariants
-        self._angles = JoinedAngles(system, self._compile, wrapping, precision=precision, countable=countable)
-        self.continuity = self._angles.first()
-        self.sparse, self.dense = self._angles.sparse, self._angles.dense
+        self.angles = JoinedAngles(system, self._compile, precision, has_steps=has_steps)
+        self.last_quaternion: np.ndarray | None = None
         self._recorded = [
             (one, np.array(one.exponents, dtype=np.int32) if any(one.exponents) else None)
             for one in system.recorded
@@ -110,26 +110,10 @@ class Evaluator:
         """Factors that vanish in the singularity of the chart in use, (n,); None without one."""
         if self._singular is None:
             return None
-        return self._by_chart(self._singular, lambda: self._partner.singular, states, chart)[0]
-
-    def _by_chart(
-        self,
-        own: CompiledFunction,
-        partners: Callable[[], CompiledFunction | None],
-        states: np.ndarray,
-        chart: np.ndarray,
-        times: np.ndarray | None = None,
-    ) -> np.ndarray:
-        """Values (outputs, n) of a function of the states in either chart, as in ``SampleBlock``."""
-        values = evaluate_rows(own, states, times=times)
-        there = chart != 0
+        values, there = evaluate_rows(self._singular, states), chart != 0
         if there.any():
-            function = partners()
-            assert function is not None
-            values[:, there] = evaluate_rows(
-                function, states[there], times=None if times is None else times[there]
-            )
-        return values
+            values[:, there] = evaluate_rows(self._partner.singular, states[there])
+        return values[0]
 
     @cached_property
     def _partner(self) -> _PartnerChart:
@@ -145,20 +129,22 @@ class Evaluator:
         )
 
     def evaluate(self, block: SampleBlock) -> RecordedParts:
-        """All variables of a block, which must follow the one before, and each invariant's drift, (n, 1)."""
+        """All variables of a block with its joined angles, which must follow the one before, and each
+        invariant's drift, (n, 1).
+        """
         assert self._outputs is not None
         initial = self.initial if self._parameters else None
         values = evaluate_rows(self._outputs, block.states, initial, block.times)
         in_partner = block.chart != 0
         angles: np.ndarray | None = None
         if self._system.partner is not None and in_partner.any():
-            there, angles = self._partner.values(block.only(in_partner), self.initial, self._wrapping)
+            there, angles = self._partner.values(block.only(in_partner, 0), self.initial, self._wrapping)
             values[:, in_partner] = there
         result: RecordedParts = {}
-        turned = self._turned(values, block) if self._angles else None
+        turned = self._turned(values, block) if self.angles else None
         for variable, exponents in self._recorded:
             columns = values[variable.first : variable.first + variable.count].T
-            if turned is not None and (part := self._angles.part(variable)) is not None:
+            if turned is not None and (part := self.angles.part(variable)) is not None:
                 columns = turned[:, part]
             columns = self._joined(variable, columns, block)
             if angles is not None and variable.continuity == "wrapped":
@@ -179,12 +165,11 @@ class Evaluator:
         Nothing is joined to them later, and angles that aren't states are within one turn, since the motion
         between two of them isn't known.
         """
-        before = copy.deepcopy(self.continuity)
-        self.continuity.wrapped_from = -math.inf
+        before = self.last_quaternion
         try:
-            return self.evaluate(block)
+            return self.evaluate(self.angles.apart(block))
         finally:
-            self.continuity = before
+            self.last_quaternion = before
 
     def _joined(self, variable: Recorded, block: np.ndarray, samples: SampleBlock) -> np.ndarray:
         turns = samples.turns
@@ -201,39 +186,32 @@ class Evaluator:
 
     def _turned(self, values: np.ndarray, block: SampleBlock) -> np.ndarray:
         """The joined angles with their turns, (n, angles)."""
-        sizes = None
-        if (own := self._angles.sizes) is not None:  # squared, of the angles' sines and cosines
-            sizes = self._by_chart(own, lambda: self._partner.sizes, block.states, block.chart, block.times)
-        angles = values[self._angles.columns].T
-        found, self.continuity = self._angles.joined(self.continuity, angles, sizes, block)
-        return found
+        return self._wrapping.unwrapped(*self.angles.recorded(values[self.angles.columns].T, block))
 
     def _nearest(self, block: np.ndarray) -> np.ndarray:
         """Give each quaternion the sign nearest to the one before."""
         plain = block.astype(np.float64)
-        before = self.continuity.last_quaternion
+        before = self.last_quaternion
         shifted = np.empty_like(plain)
         shifted[0] = self._first_quaternion if before is None else before
         shifted[1:] = plain[:-1]
         products = np.einsum("ij,ij->i", plain, shifted)
         if not (products < 0).any():
-            self.continuity.last_quaternion = plain[-1].copy()
+            self.last_quaternion = plain[-1].copy()
             return block
         signs = np.cumprod(np.where(products < 0, -1, 1))
         block = block.copy()
         block[signs < 0] = -block[signs < 0]
-        self.continuity.last_quaternion = plain[-1] * signs[-1]
+        self.last_quaternion = plain[-1] * signs[-1]
         return block
 
-    def follow(self, time: float) -> None:
-        """Count turns from the latest sample up to where the run is, for at most a fifth of a second."""
-        self._angles.follow(self.continuity, time)
-
     def pack(self) -> Arrays:
-        return self.continuity.pack()
+        last = {} if self.last_quaternion is None else {"joined_quaternion": self.last_quaternion}
+        return last | self.angles.known.pack()
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        self.continuity = Continuity.unpacked(arrays)
+        self.last_quaternion = arrays.get("joined_quaternion")
+        self.angles.known = Continuity.unpacked(arrays)
 
     def initial_invariants(self) -> dict[str, list[float]]:
         """Initial values of the invariants' components in SI, nearest doubles, by name."""

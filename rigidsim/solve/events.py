@@ -123,6 +123,7 @@ def samples_at(found: Sequence[FoundEvent], precision: Precision) -> SampleBlock
         chart=np.array([f.angles.chart for f in found], dtype=np.int64),
         reference=np.array([f.angles.reference for f in found], dtype=np.float64).reshape(n, -1),
         put_back=np.zeros((n, 0)),
+        joined=np.zeros((n, 0)),
     )
 
 

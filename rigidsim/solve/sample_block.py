@@ -41,6 +41,7 @@ class SampleBlock:
     chart: np.ndarray  # (n,) int64, 0 in the asked Euler sequence, 1 in its partner
     reference: np.ndarray
     put_back: np.ndarray  # (n, projected scalars) float64, what was put back of each until the sample
+    joined: np.ndarray  # (n, angles) float64, rad: joined angles with their full turns; NaN where undefined
 
     @classmethod
     def of(
@@ -65,6 +66,7 @@ class SampleBlock:
             np.full(n, angles.chart, dtype=np.int64),
             reference,
             put_back[None, :].repeat(n, axis=0),
+            np.zeros((n, 0)),
         )
 
     def __len__(self) -> int:
@@ -72,7 +74,7 @@ class SampleBlock:
 
     @property
     def _columns(self) -> tuple[np.ndarray, ...]:
-        return self.times, self.states, self.turns, self.chart, self.reference, self.put_back
+        return self.times, self.states, self.turns, self.chart, self.reference, self.put_back, self.joined
 
     def rows(self, start: int, stop: int) -> SampleBlock:
         """Samples start ... stop-1 of the block, or as many of them as there are."""
@@ -80,9 +82,9 @@ class SampleBlock:
             return self
         return SampleBlock(self.first + start, *(column[start:stop] for column in self._columns))
 
-    def only(self, which: np.ndarray) -> SampleBlock:
-        """Some of the samples, by a mask."""
-        return SampleBlock(self.first, *(column[which] for column in self._columns))
+    def only(self, which: np.ndarray, first: int) -> SampleBlock:
+        """Some of the samples, by a mask, as those from a number on."""
+        return SampleBlock(first, *(column[which] for column in self._columns))
 
     @staticmethod
     def joined(blocks: Sequence[SampleBlock]) -> SampleBlock:

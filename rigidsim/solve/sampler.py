@@ -11,8 +11,9 @@ import numpy as np
 from rigidsim.solve.corrected_stepper import Position, StepBoundary
 from rigidsim.solve.precision import Scalar
 from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.sampling import SampleClock
+from rigidsim.solve.sampling import Rows
 from rigidsim.solve.status import Status
+from rigidsim.solve.turns import JoinedAngles
 
 
 @dataclass
@@ -86,10 +87,14 @@ _GROWTH = 4  # largest growth of the waiting rows from one hand-over to the next
 
 
 class SampleBuffer:
-    """Collects samples and hands them over in blocks of bounded size and, as far as is known, duration."""
+    """Collects rows, the samples and what lies between them where angles are followed, and hands them over in
+    blocks of bounded size and, as far as is known, duration.
+    """
 
-    def __init__(self, clock: SampleClock, receiver: SampleReceiver, pacing: Pacing, first: int = 0) -> None:
-        self._clock = clock
+    def __init__(
+        self, rows: Rows, angles: JoinedAngles, receiver: SampleReceiver, pacing: Pacing, first: int = 0
+    ) -> None:
+        self._clock, self._angles = rows, angles
         self._receiver = receiver
         self._pacing = pacing
         self.handed = self.count = first
@@ -97,7 +102,7 @@ class SampleBuffer:
         self._most = _FEWEST_ROWS
         self._affordable: dict[str, int] = {}
         self._handed_at = time.perf_counter()
-        self._times: tuple[int, np.ndarray] = 0, clock.internal(0, 0)  # of the rows asked for last
+        self._times: tuple[int, np.ndarray] = 0, rows.internal(0, 0)  # of the rows asked for last
 
     @property
     def complete(self) -> bool:
@@ -186,20 +191,29 @@ class SampleBuffer:
         whole, boundaries = self._waiting_until(stop)
         handed = len(whole)
         for start in range(0, handed, rows):
-            block = whole.rows(start, start + rows)
+            block, known = whole.rows(start, start + rows), self._angles.known
             try:
-                self._receiver.take(block)
+                self._receive(block)
             except KeyboardInterrupt:  # while something that it needs was compiled: it took none of these
+                self._angles.known = known
                 self._pieces.insert(0, (whole.rows(start, handed), _before(block.first, boundaries)))
                 raise
             self.handed += len(block)
-            last = self._receiver.last_wanted
-            if last is not None:
-                self._pieces = []
+            wanted = self._receiver.last_wanted
+            if wanted is not None:
+                last, self._pieces, self._angles.known = self._clock.row(wanted), [], known
+                self._angles.joined(block.rows(0, last + 1 - block.first))
                 self.count = self.handed = last + 1
-                return last, _before(last, boundaries)
+                return wanted, _before(last, boundaries)
         self.took("hand over", handed, time.perf_counter() - started)
         return None
+
+    def _receive(self, block: SampleBlock) -> None:
+        """Hand over the samples among some rows, with their angles."""
+        which = self._clock.are_samples(block.first, block.first + len(block))
+        block = self._angles.joined(block)
+        if which.any():
+            self._receiver.take(block.only(which, self._clock.samples(block.first)))
 
     def _waiting_until(self, stop: int) -> tuple[SampleBlock, dict[int, StepBoundary]]:
         """Take out the waiting samples before ``stop``, and boundaries before each piece, by its first."""

@@ -36,8 +36,8 @@ class SampleClock:
     def __init__(self, samples: SampleTimes, precision: Precision, scaling: Scaling) -> None:
         self.count = samples.count
         self._scaling, self.unit = scaling, float(scaling.seconds(1.0))
+        self.precision = precision
         self.part_count = precision.part_count if precision.bits == 53 else max(2, precision.part_count)
-        self._precision = precision
         self._double = precision_of("double")
         self._samples = samples
         self._divisor = math.lcm(samples.begin.denominator, samples.step.denominator)
@@ -51,7 +51,12 @@ class SampleClock:
 
     def internal(self, first: int, stop: int) -> np.ndarray:
         """Times of samples first ... stop-1 in internal units, shape (stop - first,), in the precision."""
-        return self._seconds(first, stop, self._precision) * self._per_second
+        return self._seconds(first, stop, self.precision) * self._per_second
+
+    @property
+    def gaps(self) -> np.ndarray | None:
+        """Spacing of a list's samples, s; None for a grid."""
+        return None if self._samples.times is None else np.abs(np.diff(self._samples.doubles))
 
     def at(self, index: int) -> Scalar:
         """One sample's time in internal units, a scalar of the precision."""
@@ -59,12 +64,12 @@ class SampleClock:
 
     def seconds(self, time: Scalar) -> float:
         """The double nearest to a time in internal units, s."""
-        alone = np.array([time], dtype=self._precision.scalar)
-        return float(self._scaling.seconds(self._precision.parts(alone)[0][0]))
+        alone = np.array([time], dtype=self.precision.scalar)
+        return float(self._scaling.seconds(self.precision.parts(alone)[0][0]))
 
     def parts_of(self, times: np.ndarray) -> list[np.ndarray]:
         """Any times in internal units as float64 parts, s."""
-        return [self._scaling.seconds(part) for part in self._precision.parts(times)]
+        return [self._scaling.seconds(part) for part in self.precision.parts(times)]
 
     def labels(self, first: int, stop: int) -> np.ndarray:
         """The double nearest to the time of each sample first ... stop-1, s."""
@@ -73,10 +78,10 @@ class SampleClock:
     def parts(self, first: int, times: np.ndarray) -> list[np.ndarray]:
         """Labels of samples from ``first`` on (s) and residuals, which sum exactly to the time."""
         exact = times / self._per_second
-        if self._precision.bits == 53:
+        if self.precision.bits == 53:
             return [exact]
-        parts = self._precision.parts(exact, self.labels(first, first + len(times)))
-        if self._precision.bits < 53:
+        parts = self.precision.parts(exact, self.labels(first, first + len(times)))
+        if self.precision.bits < 53:
             parts.append(exact.astype(np.float64) - parts[0])
         return parts
 
@@ -137,11 +142,54 @@ class SampleClock:
             if len(together):
                 i = first + int(together[0])
                 what = (
-                    f"samples {i} and {i + 1} are closer together than {self._precision.name} precision "
+                    f"samples {i} and {i + 1} are closer together than {self.precision.name} precision "
                     f"resolves near {float(samples.last):g} s; sample less often, shift start, or choose a "
                     "higher precision"
                 )
                 raise ConfigError(Problem("[time]", what))
+
+
+class Rows:
+    """The samples of a clock, and rows between them: so many from sample to sample, where these are farthest
+    apart, and fewer elsewhere.
+    """
+
+    def __init__(self, clock: SampleClock, parts: int = 1) -> None:
+        self.clock = clock
+        self._parts = max(1, parts)
+        self._firsts: np.ndarray | None = None  # rows of a list's samples
+        if parts > 1 and (gaps := clock.gaps) is not None:
+            each = np.ceil(gaps / gaps.max() * parts).astype(np.int64)
+            self._firsts = np.concatenate([[0], np.cumsum(np.maximum(each, 1))])
+        self.count = self.row(clock.count - 1) + 1
+
+    def row(self, sample: int) -> int:
+        """The row of a sample."""
+        return sample * self._parts if self._firsts is None else int(self._firsts[sample])
+
+    def samples(self, row: int) -> int:
+        """Number of samples before a row."""
+        return -(-row // self._parts) if self._firsts is None else int(np.searchsorted(self._firsts, row))
+
+    def are_samples(self, first: int, stop: int) -> np.ndarray:
+        """Which of the rows first ... stop-1 are samples, (n,)."""
+        rows = np.arange(first, stop)
+        return rows % self._parts == 0 if self._firsts is None else np.isin(rows, self._firsts)
+
+    def internal(self, first: int, stop: int) -> np.ndarray:
+        """Times of rows first ... stop-1, as ``SampleClock.internal``."""
+        if self._parts == 1 or stop <= first:
+            return self.clock.internal(first, stop)
+        begin = self.samples(first + 1) - 1
+        end = min(self.samples(stop) + 1, self.clock.count)
+        times, samples = self.clock.internal(begin, end), np.arange(begin, end)
+        firsts = samples * self._parts if self._firsts is None else self._firsts[begin:end]
+        rows = np.arange(first, stop)
+        before = np.searchsorted(firsts, rows, side="right") - 1
+        here, ahead = times[before], times[np.minimum(before + 1, len(times) - 1)]
+        apart = firsts[np.minimum(before + 1, len(times) - 1)] - firsts[before]
+        into = self.clock.precision.of_doubles((rows - firsts[before]) / np.maximum(apart, 1))
+        return here + (ahead - here) * into
 
 
 def _nearest(numerator: int, denominator: int, precision: Precision) -> Scalar:

@@ -311,6 +311,6 @@ def _seconds_per_sample(prepared: InitialValueProblem, parts: Assembly, row: flo
     times = np.repeat(prepared.clock.internal(0, 1), count)
     block = SampleBlock.of(0, times, states, parts.wrapping.angles)
     started = time.perf_counter()
-    parts.evaluator.evaluate(block)
+    parts.evaluator.evaluate(parts.evaluator.angles.apart(block))
     evaluation = (time.perf_counter() - started) / count
     return evaluation + row * _COMPRESSION + _BUFFERING

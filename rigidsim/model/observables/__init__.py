@@ -9,7 +9,6 @@ from rigidsim.model.observables import core, kernel_bodies  # noqa: F401
 from rigidsim.model.observables.observable import (
     Angle as Angle,
     Observable as Observable,
-    Steady as Steady,
     always as always,
     continuous_angles as continuous_angles,
     only_when_named as only_when_named,

@@ -26,7 +26,7 @@ from rigidsim.model.observables.observable import (
     register_all,
     told,
 )
-from rigidsim.model.observables.steadiness import is_planet, steady_directions, steady_meridian
+from rigidsim.model.observables.steadiness import is_planet
 from rigidsim.model.rotations import Symbolic, apply, unit
 from rigidsim.scene.space_axes import ECLIPTIC, obliquity, to_equator
 
@@ -97,7 +97,7 @@ register_all(
     continuous_angles(
         "right_ascension", AXIS, "right ascension of the figure, spin and momentum axes",
         lambda m: [Angle(y, x) for x, y, _ in _on_sky(m, three_axes(m))],
-        frame="space axes", needs=("attitude",), steady=steady_directions,
+        frame="space axes", needs=("attitude",),
         attributes=_sky("longitude from X towards Y, turns counted; NaN at the poles"),
     ),
     Observable(
@@ -108,7 +108,7 @@ register_all(
     ),
     continuous_angles(
         "prime_meridian", (), "angle of the prime meridian, the IAU's W", _meridian,
-        frame="space axes", needs=("attitude",), steady=steady_meridian, absent=_no_meridian,
+        frame="space axes", needs=("attitude",), absent=_no_meridian,
         attributes=told(
             "from where the equator of the figure axis rises through the mean equator of J2000, along it in "
             "the direct sense to the figure's first axis; turns counted; NaN at the poles",
@@ -125,7 +125,7 @@ register_all(
         "node_longitude", AXIS,
         "longitude of the node of the equator of the figure, spin and momentum axes",
         lambda m: [Angle(u, -v) for u, v, _ in _on_plane(m)],
-        frame="space axes", needs=("attitude", "plane"), by_default=is_planet, steady=steady_directions,
+        frame="space axes", needs=("attitude", "plane"), by_default=is_planet,
         attributes=told(
             "where the equator whose pole is the axis rises through the reference plane, from X turned by "
             "the smallest rotation that takes Z to the normal, in the direct sense; turns counted; NaN where "

@@ -214,18 +214,6 @@ class Angle:
 
 
 @dataclass(frozen=True)
-class Steady:
-    """How angles advance between samples, if that tells their full turns without following the motion.
-
-    The last two count for an angle whose sine and cosine have size 1, and are divided by a smaller one.
-    """
-
-    rates: list[Symbolic]  # of each angle, rad per internal unit of time
-    uncertainty: float  # by how much the rates may change between samples, rad/s
-    excursion: float  # additional deviation of the angles, rad
-
-
-@dataclass(frozen=True)
 class Observable:
     """One recordable quantity; register your own with ``rigidsim.scene.registry.register_observable``.
 
@@ -245,7 +233,6 @@ class Observable:
         continuity: how samples are joined, see ``rigidsim.model.outputs.Recorded``.
         angles: the angles whose full turns are counted (``continuous_angles``), if it consists of such.
         poles: for Euler angles that are functions of the state, where only one of the outer ones is defined.
-        steady: how its angles advance between samples; None if the motion has to be followed.
         attributes: further attributes of the variable: convention, reference plane, ...
         absent: why this scene can't have it although it meets all needs; None if it can.
     """
@@ -264,7 +251,6 @@ class Observable:
     continuity: Callable[[Mechanics], str] = lambda _: ""
     angles: Callable[[Mechanics], list[Angle]] | None = None
     poles: Callable[[Mechanics], Poles | None] = _without
-    steady: Callable[[Mechanics], Steady | None] = _without
     attributes: Callable[[Mechanics], Mapping[str, str]] = lambda _: {}
     absent: Callable[[Mechanics], str | None] = _without
 

@@ -32,7 +32,7 @@ from rigidsim.model.observables.observable import (
     same_unit,
     told,
 )
-from rigidsim.model.observables.steadiness import is_nearly_axial, steady_rotation
+from rigidsim.model.observables.steadiness import is_nearly_axial
 from rigidsim.model.rotations import Symbolic, along, apply, length, unit
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import apply as apply_numbers
@@ -99,7 +99,7 @@ def _rotation_sum(m: Mechanics) -> str:
 register_all(
     continuous_angles(
         "rotation_angle", (), "angle of rotation about the angular momentum", _rotation_angle,
-        frame="space axes", needs=("attitude", "plane"), by_default=is_nearly_axial, steady=steady_rotation,
+        frame="space axes", needs=("attitude", "plane"), by_default=is_nearly_axial,
         attributes=told(
             lambda m: f"{_rotation_sum(m)} of andoyer_angles: from X, carried to the momentum's equator by "
             "the smallest rotations, to the figure's first axis; in the direct sense about the momentum; "

@@ -1,1 +1,0 @@
-"""Full turns of angles between samples, counted along the motion."""
