@@ -16,9 +16,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from experiments.common import Command
-from experiments.coverage.averages import judge_average
 from experiments.coverage.families import FAMILIES, coverage_scene
-from experiments.coverage.judging import Judged, judge
+from experiments.coverage.judging import Judged, judge, judge_average
 
 FALSE_ALARM = 1e-4  # rad
 
@@ -77,15 +76,13 @@ def broken_promises(judged: Sequence[Judged]) -> list[str]:
             problems.append(f"{what}: more than 10 times what was announced without a warning: {silent}")
         if np.median(1 / np.maximum(values, 1e-300)) > 20:
             problems.append(f"{what}: median announced over true is above 20")
-    alarms = [one.number for one in judged if one.gone and one.true < FALSE_ALARM]
-    if alarms:
-        problems.append(f"digits said to be gone where less than {FALSE_ALARM} rad is true: {alarms}")
-    drifting = [one.number for one in judged if one.drifting]
-    if drifting:
-        problems.append(f"claimed as invariants that drift even with more digits: {drifting}")
-    broken = [one.number for one in judged if one.ended in ("broken", "no truth")]
-    if broken:
-        problems.append(f"broken: {broken}")
+    for what, numbers in (
+        (f"digits said to be gone where less than {FALSE_ALARM} rad is true",
+         [one.number for one in judged if one.gone and one.true < FALSE_ALARM]),
+        ("claimed as invariants that drift even with more digits", [x.number for x in judged if x.drifting]),
+        ("broken", [one.number for one in judged if one.ended in ("broken", "no truth")]),
+    ):  # fmt: skip
+        problems += [f"{what}: {numbers}"] * bool(numbers)
     return problems
 
 

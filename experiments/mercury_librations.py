@@ -12,12 +12,17 @@ Astr. 101, 141); Peale, Margot & Yseboodt 2009 (Icarus 199, 1).
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Study, simulate
-from experiments.real_bodies import mercury
 
+ARCSEC = math.radians(1 / 3600)
+YEAR = 365.25
+FORCED = (11.862, 5.931, 5.663, 14.73, 6.58, 3.954)
+"""Periods of forced librations, yr: Jupiter and its harmonics, Venus (the third), Saturn, the Earth."""
+HARMONICS = 6
 SCENE = CONFIGS / "kernels" / "mercury_libration.toml"
 START = 2415083.0 - 2451545.0
 IAU = (38.421252, -4.043124, -0.39744, -0.091404, -0.020556)
@@ -31,26 +36,101 @@ MOMENTS = [1 - (6e-5 + 2e-5) / 0.34, 1 - (6e-5 - 2e-5) / 0.34, 1]
 RIGID = ("body.preset=", "body.core=", f"body.principal_moments={MOMENTS!r}")
 
 
+def anomaly(days: np.ndarray) -> np.ndarray:
+    """Mean anomaly of Mercury, rad, so many days after J2000 (Archinal et al. 2018)."""
+    return np.asarray(np.radians(174.7910857 + 4.092335 * days))
+
+
+def angle(quaternion: np.ndarray) -> np.ndarray:
+    """Angle of the x axis about the mean z axis, rad, continuous, from where that plane cuts the XY plane."""
+    w, x, y, z = quaternion.T
+    first = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], axis=1)
+    pole = np.mean(
+        np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1), axis=0
+    )
+    pole /= np.linalg.norm(pole)
+    node = np.array([-pole[1], pole[0], 0.0]) / math.hypot(pole[0], pole[1])
+    return np.unwrap(np.arctan2(first @ np.cross(pole, node), first @ node))
+
+
+@dataclass(frozen=True)
+class Libration:
+    """Lines of a libration in longitude.
+
+    Attributes:
+        rate: mean rate at J2000, deg/day.
+        annual: amplitudes of sin kM, arcsec, from k = 1.
+        quadrature: the largest of cos kM, arcsec.
+        forced: amplitudes by period (yr), arcsec.
+        free: complex amplitude of the free libration, as C exp(i s t) with t from the first sample, arcsec.
+        period: the free libration's, yr.
+        rest: what is left over, arcsec, rms.
+    """
+
+    rate: float
+    annual: list[float]
+    quadrature: float
+    forced: dict[float, float]
+    free: complex
+    period: float
+    rest: float
+
+
+def fit(days: np.ndarray, turned: np.ndarray, near: float) -> Libration:
+    """All lines, a parabola, and a free libration that is well seen, of a period (yr) near a given one."""
+    width = 0.05
+    for _ in range(4):  # the rest is quadratic in the period, near its least value
+        tried = [lines(days, turned, near + step) for step in (-width, 0.0, width)]
+        a, b, c = (one.rest**2 for one in tried)
+        if a - 2 * b + c > 0:
+            near += max(min(width * (a - c) / (2 * (a - 2 * b + c)), 5 * width), -5 * width)
+        width /= 4
+    return lines(days, turned, near)
+
+
+def lines(days: np.ndarray, turned: np.ndarray, free: float) -> Libration:
+    """All lines, a parabola, and a free libration of a given period (yr), by least squares."""
+    centuries, m = days / 36525, anomaly(days)
+    columns = [centuries**k for k in range(3)]
+    for k in range(1, HARMONICS + 1):
+        columns += [np.sin(k * m), np.cos(k * m)]
+    for period in (*FORCED, free):
+        phase = 2 * math.pi * (days - days[0]) / (YEAR * period)
+        columns += [np.cos(phase), np.sin(phase)]
+    matrix = np.stack(columns, axis=1)
+    found, *_ = np.linalg.lstsq(matrix, turned / ARCSEC, rcond=None)
+    annual, late = found[3 : 3 + 2 * HARMONICS], found[3 + 2 * HARMONICS :]
+    return Libration(
+        float(found[1]) / 3600 / 36525,
+        annual[::2].tolist(),
+        float(np.abs(annual[1::2]).max()),
+        {period: float(np.hypot(*late[2 * i : 2 * i + 2])) for i, period in enumerate(FORCED)},
+        complex(late[-2], -late[-1]),
+        free,
+        float(np.std(turned / ARCSEC - matrix @ found)),
+    )
+
+
 def run(*settings: str) -> tuple[np.ndarray, np.ndarray]:
     """Days after J2000, and the angle turned, rad."""
     result = simulate(SCENE, "output.record=['quaternion']", "output.estimate=false", *settings)
-    return START + result.values("time") / 86400, mercury.angle(result.values("quaternion"))
+    return START + result.values("time") / 86400, angle(result.values("quaternion"))
 
 
 def free_period(ratio: float) -> float:
     """Of the libration, yr, for (B - A) over the moment that librates."""
     e = 0.2056336
-    return 87.9691 / math.sqrt(3 * ratio * (7 * e / 2 - 123 * e**3 / 16 + 489 * e**5 / 128)) / mercury.YEAR
+    return 87.9691 / math.sqrt(3 * ratio * (7 * e / 2 - 123 * e**3 / 16 + 489 * e**5 / 128)) / YEAR
 
 
-def picture(days: np.ndarray, turned: np.ndarray, real: mercury.Libration) -> Picture:
+def picture(days: np.ndarray, turned: np.ndarray, real: Libration) -> Picture:
     """A few orbits, 150 years, and amplitudes by the period of the free libration."""
-    rest = turned / mercury.ARCSEC - np.polyval(np.polyfit(days, turned / mercury.ARCSEC, 1), days)
-    m, few = mercury.anomaly(days), slice(0, 132)
+    rest = turned / ARCSEC - np.polyval(np.polyfit(days, turned / ARCSEC, 1), days)
+    m, few = anomaly(days), slice(0, 132)
     annual, observed = (
         sum(a * np.sin((k + 1) * m) for k, a in enumerate(lines)) for lines in (real.annual, IAU)
     )
-    slow, span, years = rest - annual, days[few] - days[0], 2000 + days / mercury.YEAR
+    slow, span, years = rest - annual, days[few] - days[0], 2000 + days / YEAR
     period = np.linspace(10, 20, 2001)
     resonance = [Curve(period, real.annual[0] * (real.period / period) ** 2, "88 days", "grey", width=1),
                  Curve(real.period, real.annual[0], "", "grey", "o")]  # fmt: skip
@@ -80,9 +160,9 @@ def study(full: bool) -> Answer:
     """Lines of three runs."""
     ratio = 4 * 0.8067e-5 / 0.346
     days, turned = run()
-    real = mercury.lines(days, turned, free_period(ratio / 0.431))
-    other = mercury.lines(*run(*DUFEY), free_period(ratio / 0.401))
-    loose = mercury.fit(*run(*RIGID), 15.85)
+    real = lines(days, turned, free_period(ratio / 0.431))
+    other = lines(*run(*DUFEY), free_period(ratio / 0.401))
+    loose = fit(*run(*RIGID), 15.85)
     first = real.annual[0]
     checks = [
         Check("libration of 88 days", first, 38.5, 1.6, "arcsec", "Margot et al. 2012; its error",

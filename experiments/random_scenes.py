@@ -208,14 +208,6 @@ def _on_orbit(draw: Draw, eccentricity: float) -> None:
     draw.source(axis, motion, eccentricity, **{name: draw.between(0, 3) for name in names})
 
 
-def _circular_orbit(draw: Draw) -> None:
-    _on_orbit(draw, 0.0)
-
-
-def _eccentric_orbit(draw: Draw) -> None:
-    _on_orbit(draw, draw.between(0.01, 0.4))
-
-
 def _central_gravity(draw: Draw) -> None:
     draw.horizon = 1e3
     draw.body(draw.moments())
@@ -238,44 +230,18 @@ def _viscous(draw: Draw) -> None:
     draw.load("viscous_torque", f"coefficients = {[unit * draw.between(0.3, 1) for _ in range(3)]}")
 
 
-def _torque(draw: Draw, frame: str, components: Sequence[str]) -> None:
-    draw.horizon = 1e3
-    draw.body(draw.moments(), turned=draw.sometimes(0.3))
-    draw.start(draw.direction())
-    size = draw.mass * draw.length**2 / draw.time**2
-    draw.parameters = [f"k = {size * draw.decades(-4, -1)!r}", f"n = {draw.between(0.1, 2) / draw.time!r}"]
-    draw.load("torque", f"components = {list(components)}", f'frame = "{frame}"')
+def _torque(frame: str, *components: str, horizon: float = 1e3) -> Callable[[Draw], None]:
+    """A torque of strength k and frequency n, in the axes of the body or of space."""
 
+    def drawn(draw: Draw) -> None:
+        draw.horizon = horizon
+        draw.body(draw.moments(), turned=draw.sometimes(0.3))
+        draw.start(draw.direction())
+        k = draw.mass * draw.length**2 / draw.time**2 * draw.decades(-4, -1)
+        draw.parameters = [f"k = {k!r}", f"n = {draw.between(0.1, 2) / draw.time!r}"]
+        draw.load("torque", f"components = {list(components)}", f'frame = "{frame}"')
 
-def _body_torque(draw: Draw) -> None:
-    _torque(draw, "body", ["k*sin(n*t)", "0.5*k", "-k*wx*wy/n^2"])
-
-
-def _space_torque(draw: Draw) -> None:
-    _torque(draw, "space", ["k*cos(n*t)^2", "-k*sin(n*t)", "0.2*k"])
-
-
-def _pulse(draw: Draw) -> None:
-    """A short push late in the run, of which no beginning of the motion knows."""
-    _torque(draw, "body", ["k*exp(-(n*(t - late))^2)", "0", "3*k*exp(-(n*(t - late))^2)"])
-
-
-def _kinked(draw: Draw) -> None:
-    """A torque with kinks in time and in the rates."""
-    _torque(draw, "body", ["k*abs(sin(n*t))", "-k*max(wy, 0)/n", "k*sqrt((wx - wz)^2)/n"])
-    draw.horizon = _KINKED_HORIZON
-
-
-def _dry_friction(draw: Draw) -> None:
-    """It jumps wherever a rate changes its sign."""
-    _torque(draw, "body", ["-k*sign(wx)", "-0.6*k*sign(wy)", "0.4*k*cos(n*t)"])
-    draw.horizon = _KINKED_HORIZON
-
-
-def _signed_quaternion(draw: Draw) -> None:
-    """A torque that jumps where the quaternion changes its sign, and is the same at q and -q."""
-    _torque(draw, "body", ["k*sign(qw)*qx", "0", "0.4*k*qw*qz"])
-    draw.horizon = _KINKED_HORIZON
+    return drawn
 
 
 def _plunge(draw: Draw) -> None:
@@ -302,17 +268,23 @@ KINDS: dict[str, Callable[[Draw], None]] = {
     "Kovalevskaya top": _kovalevskaya,
     "heavy asymmetric top": _heavy_asymmetric,
     "fixed source": _fixed_source,
-    "circular orbit": _circular_orbit,
-    "eccentric orbit": _eccentric_orbit,
+    "circular orbit": lambda draw: _on_orbit(draw, 0.0),
+    "eccentric orbit": lambda draw: _on_orbit(draw, draw.between(0.01, 0.4)),
     "central gravity": _central_gravity,
     "free flight": _free_flight,
     "viscous": _viscous,
-    "torque, body axes": _body_torque,
-    "torque, space axes": _space_torque,
-    "late pulse": _pulse,
-    "kinked torque": _kinked,
-    "dry friction": _dry_friction,
-    "sign of the quaternion": _signed_quaternion,
+    "torque, body axes": _torque("body", "k*sin(n*t)", "0.5*k", "-k*wx*wy/n^2"),
+    "torque, space axes": _torque("space", "k*cos(n*t)^2", "-k*sin(n*t)", "0.2*k"),
+    # a short push, of which no beginning of the motion knows
+    "late pulse": _torque("body", "k*exp(-(n*(t - late))^2)", "0", "3*k*exp(-(n*(t - late))^2)"),
+    "kinked torque": _torque(
+        "body", "k*abs(sin(n*t))", "-k*max(wy, 0)/n", "k*sqrt((wx - wz)^2)/n", horizon=_KINKED_HORIZON
+    ),
+    "dry friction": _torque(
+        "body", "-k*sign(wx)", "-0.6*k*sign(wy)", "0.4*k*cos(n*t)", horizon=_KINKED_HORIZON
+    ),
+    # it jumps where the quaternion changes its sign, and is the same at q and -q
+    "sign of the quaternion": _torque("body", "k*sign(qw)*qx", "0", "0.4*k*qw*qz", horizon=_KINKED_HORIZON),
     "plunge": _plunge,
 }
 

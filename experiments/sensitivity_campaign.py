@@ -1,6 +1,6 @@
 """Are sensitivities right? Random keys and scenes, against differences of runs in higher precision.
 
-Each case draws a scene (``sensitivity_scenes``) and one number of its config. A run in double precision
+Each case draws a scene and one number of its config. A run in double precision
 records the derivatives. Four runs with this number moved, in quadruple precision, give the central difference
 of fourth order: steps h of 1e-6 leave some h^4 = 1e-24, and 1e-13 for the 80 bits in which they are
 subtracted. They share nothing with the variational equations but the way from a config to equations. The
@@ -9,6 +9,7 @@ largest difference along the run, relative to the derivative's largest value the
 Run: python -m experiments.sensitivity_campaign [--scenes 200] [--first 0]      exit code 1 if one is off
 """
 
+import random
 import warnings
 from dataclasses import dataclass
 from fractions import Fraction
@@ -19,7 +20,6 @@ import numpy as np
 
 import rigidsim
 from experiments.common import Command
-from experiments.sensitivity_scenes import Case, case
 from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.scene.varied_keys import varied_keys
 from rigidsim.workflows.read import parse
@@ -27,6 +27,184 @@ from rigidsim.workflows.read import parse
 BOUND = 1e-9
 _MOVED = Fraction(1, 1 << 20)  # of a number's size
 _WEIGHTS = {1: 8.0, -1: -8.0, 2: -1.0, -2: 1.0}  # times 1 / 12 h
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene, and the number of its config that derivatives are by."""
+
+    number: int
+    family: str
+    text: str
+    key: str
+
+
+def _moments(draw: random.Random) -> str:
+    a, b = draw.uniform(1, 2), draw.uniform(1, 2)
+    return f"[{a:.6f}, {b:.6f}, {draw.uniform(max(a, b), 0.95 * (a + b)):.6f}]"
+
+
+def _vector(draw: random.Random, size: float = 1.0) -> str:
+    return "[" + ", ".join(f"{draw.uniform(-size, size):.6f}" for _ in range(3)) + "]"
+
+
+def _start(draw: random.Random) -> str:
+    q = [draw.gauss(0, 1) for _ in range(4)]
+    return f"[initial]\nangular_velocity = {_vector(draw)}\nquaternion = {[round(x, 6) for x in q]}\n"
+
+
+_STARTS = [f"initial.angular_velocity[{i}]" for i in range(3)] + [f"initial.attitude[{i}]" for i in range(3)]
+_MOMENTS = [f"body.principal_moments[{i}]" for i in range(3)]
+_ORBIT = """orbit = {{semi_major_axis = {a:.6f}, eccentricity = {e:.6f}, inclination = "{i:.4f} deg",
+  ascending_node = {n:.5f}, periapsis = {p:.5f}, mean_anomaly = {m:.5f}}}
+""".replace("\n  ", " ")
+_IN_ORBIT = ["semi_major_axis", "eccentricity", "inclination", "ascending_node", "periapsis", "mean_anomaly"]
+
+
+def _orbit(draw: random.Random) -> str:
+    return _ORBIT.format(
+        a=draw.uniform(1, 2),
+        e=draw.choice([0.01, draw.uniform(0.01, 0.4)]),
+        i=draw.uniform(0, 180),
+        n=draw.uniform(0, 6),
+        p=draw.uniform(0, 6),
+        m=draw.uniform(0, 6),
+    )
+
+
+def _free(draw: random.Random) -> tuple[str, list[str]]:
+    if draw.random() < 0.5:
+        return f"[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}", _STARTS + _MOMENTS
+    off = [draw.choice([0.0, draw.uniform(-0.2, 0.2)]) for _ in range(3)]
+    a, b, c = (draw.uniform(1.5, 2) for _ in range(3))
+    rows = [[a, off[0], off[1]], [off[0], b, off[2]], [off[1], off[2], c]]
+    shown = [[round(x, 6) for x in row] for row in rows]
+    keys = [f"body.inertia_tensor[{i}][{j}]" for i in range(3) for j in range(i, 3)]
+    return f"[body]\ninertia_tensor = {shown}\n{_start(draw)}", _STARTS[:2] + keys
+
+
+def _symmetric(draw: random.Random) -> tuple[str, list[str]]:
+    return f"[body]\nprincipal_moments = [1.5, 1.5, {draw.uniform(1, 2):.5f}]\n{_start(draw)}", _MOMENTS
+
+
+def _momentum(draw: random.Random) -> tuple[str, list[str]]:
+    keys = [f"initial.angular_momentum[{i}]" for i in range(3)] + _STARTS[3:] + _MOMENTS
+    text = f"[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}"
+    return text.replace("angular_velocity", "angular_momentum"), keys
+
+
+def _shape(draw: random.Random) -> tuple[str, list[str]]:
+    size = [round(draw.uniform(0.5, 1.5), 4) for _ in range(3)]
+    text = f'[body]\nshape = "cuboid"\nmass = {draw.uniform(1, 3):.4f}\nsize = {size}\n{_start(draw)}'
+    torque = '[[loads]]\nkind = "torque"\ncomponents = ["0.1", "-0.05*wy", "0"]\n'
+    return text + torque, [_STARTS[0], "body.mass", "body.size[0]", "body.size[2]"]
+
+
+def _torque(draw: random.Random) -> tuple[str, list[str]]:
+    k = [draw.choice([0.0, draw.uniform(-0.5, 0.5)]), draw.uniform(0.1, 1), draw.uniform(0.5, 2)]
+    names = f"[parameters]\na = {k[0]:.5f}\nb = {k[1]:.5f}\nc = {k[2]:.5f}\n"
+    frame = draw.choice(["body", "space"])
+    parts = '["a*wx + b*sin(c*t)", "-b*wy*exp(-c*wz^2)", "a*b*cos(c*t)"]'
+    load = f'[[loads]]\nkind = "torque"\nframe = "{frame}"\ncomponents = {parts}\n'
+    text = f"{names}[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}{load}"
+    return text, _STARTS[::2] + _MOMENTS[:1] + 2 * ["parameters.a", "parameters.b", "parameters.c"]
+
+
+def _viscous(draw: random.Random) -> tuple[str, list[str]]:
+    load = f'[[loads]]\nkind = "viscous_torque"\ncoefficients = [0.1, 0.02, {draw.uniform(0.01, 0.2):.4f}]\n'
+    text = f"[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}{load}"
+    return text, _MOMENTS[:1] + [f"loads[0].coefficients[{i}]" for i in range(3)]
+
+
+def _top(draw: random.Random) -> tuple[str, list[str]]:
+    center = draw.choice([_vector(draw, 0.3), "[0, 0, 0.4]"])
+    body = f"[body]\nprincipal_moments = {_moments(draw)}\nmass = 1.5\ncenter_of_mass = {center}\n"
+    load = '[[loads]]\nkind = "uniform_gravity"\nacceleration = [0, 0, -1.3]\n'
+    keys = ["body.mass", "loads[0].acceleration[2]", "loads[0].acceleration[0]"]
+    return body + _start(draw) + load, _STARTS + _MOMENTS + keys + [
+        f"body.center_of_mass[{i}]" for i in (0, 2)
+    ]
+
+
+def _gradient(draw: random.Random) -> tuple[str, list[str]]:
+    load = f'[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 1.2\n{_orbit(draw)}'
+    keys = ["loads[0].gravitational_parameter", *(f"loads[0].orbit.{key}" for key in _IN_ORBIT)]
+    return f"[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}{load}", [*_STARTS[::3], *keys]
+
+
+def _flight(draw: random.Random) -> tuple[str, list[str]]:
+    place = f"position = [5, 0.3, -0.2]\nvelocity = [0.05, {draw.uniform(0.4, 0.5):.4f}, 0.1]\n"
+    load = '[[loads]]\nkind = "central_gravity"\ngravitational_parameter = 1.1\n'
+    body = f"[body]\nprincipal_moments = {_moments(draw)}\nmass = {draw.uniform(1, 2):.4f}\n"
+    keys = ["initial.position[0]", "initial.velocity[1]", "loads[0].gravitational_parameter", "body.mass"]
+    return body + _start(draw) + place + load, [*_STARTS[1:5], *keys, _MOMENTS[1]]
+
+
+def _wheels(draw: random.Random) -> tuple[str, list[str]]:
+    wheel = '[[rotors]]\nname = "wheel"\naxis = [0.2, 0.3, 1]\nmoment = 0.08\nrate = 4\ntorque = "-k*wz"\n'
+    fixed = '[[rotors]]\nname = "second"\naxis = [1, 0, 0]\nmoment = 0.05\nrate = -3\nfixed = true\n'
+    text = f"[parameters]\nk = {draw.uniform(0.05, 0.2):.4f}\n[body]\nprincipal_moments = {_moments(draw)}\n"
+    keys = ["rotors[0].moment", "rotors[0].rate", "rotors[1].rate", "rotors[0].axis[0]", "parameters.k"]
+    return text + _start(draw) + wheel + fixed, _MOMENTS[:2] + keys
+
+
+def _core(draw: random.Random) -> tuple[str, list[str]]:
+    core = (
+        "[body.core]\nmoment = 0.2\nflattening = 0.05\nfriction = 0.03\nangular_velocity = [0.1, 0.2, 0.9]\n"
+    )
+    keys = [f"body.core.{key}" for key in ("moment", "flattening", "friction", "angular_velocity[0]")]
+    body = f"[body]\nprincipal_moments = [1.6, 1.7, {draw.uniform(1.8, 2):.4f}]\n{core}"
+    return body + _start(draw), _MOMENTS[::2] + keys
+
+
+def _own(draw: random.Random) -> tuple[str, list[str]]:
+    state = '[[states]]\nname = "integral"\ninitial = 0.2\nderivative = "wz - g*integral"\n'
+    load = '[[loads]]\nkind = "torque"\ncomponents = ["-0.2*wx", "0", "-g*integral"]\n'
+    text = f"[parameters]\ng = {draw.uniform(0.2, 0.6):.4f}\n[body]\nprincipal_moments = {_moments(draw)}\n"
+    return text + _start(draw) + load + state, ["parameters.g", "states[0].initial", *_MOMENTS[1:]]
+
+
+def _elastic(draw: random.Random) -> tuple[str, list[str]]:
+    part = "[body.elasticity]\nlove_number = 6e-13\ndelay = 0.05\nradius = 1.2\nmean_rate = 0.8\n"
+    load = f'[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 1.2\n{_orbit(draw)}'
+    keys = [f"body.elasticity.{key}" for key in ("love_number", "delay", "radius")]
+    body = f"[body]\nprincipal_moments = [1.6, 1.7, 1.9]\nmass = 1.5\n{part}"
+    return body + _start(draw) + load, [*keys, "loads[0].orbit.semi_major_axis", _STARTS[0], _STARTS[3]]
+
+
+def _dipole(draw: random.Random) -> tuple[str, list[str]]:
+    load = f'[[loads]]\nkind = "magnetic_dipole"\nmoment = {_vector(draw)}\nfield = {_vector(draw)}\n'
+    keys = ["loads[0].moment[0]", "loads[0].field[2]"]
+    return f"[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}{load}", _STARTS[1:4] + keys
+
+
+FAMILIES = {
+    "free": _free, "symmetric": _symmetric, "momentum": _momentum, "shape": _shape, "torque": _torque,
+    "viscous": _viscous, "top": _top, "gradient": _gradient, "flight": _flight, "wheels": _wheels,
+    "core": _core, "own": _own, "elastic": _elastic, "dipole": _dipole,
+}  # fmt: skip
+
+
+def case(number: int) -> Case:
+    """The case of a number."""
+    draw = random.Random(f"sensitivity {number}")
+    family = list(FAMILIES)[number % len(FAMILIES)]
+    body, keys = FAMILIES[family](draw)
+    formulation = draw.choice(["auto", "auto", "euler_angles", "rotation_matrix"])
+    sequence = draw.choice(["zxz", "zyx"])
+    held = draw.choice(["true", "false"]) if family in ("free", "symmetric", "momentum", "top") else "false"
+    end = draw.uniform(5, 15)
+    text = f"""name = "case-{number}"
+{body}
+[time]
+end = {end:.4f}
+samples = {draw.choice([4, 9, 60])}
+[integrator]
+formulation = "{formulation}"
+euler_sequence = "{sequence}"
+hold_invariants = {held}
+"""
+    return Case(number, family, text, draw.choice(keys))
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,7 @@ import numpy as np
 
 from experiments.common import Answer, Check, Curve, Panel, Picture, Study
 from experiments.extremes.judging import Verdict, judge
-from experiments.extremes.random_scenes import random_case
-from experiments.extremes.scenes import ANY, Extreme, all_scenes
+from experiments.extremes.scenes import ANY, Extreme, all_scenes, random_case
 
 SEED = 20240607
 RANDOM_SCENES = 1200

@@ -177,19 +177,15 @@ def _switching(draw: Draw) -> None:
     """Kinks and jumps that a tumbling body comes to again and again."""
     draw.body(draw.moments())
     draw.start(draw.direction())
-    draw.parameters += [
-        f"k = {draw.mass * draw.length**2 / draw.time**2 * draw.decades(-3, -1)!r}",
-        f"n = {1 / draw.time!r}",
+    size = draw.mass * draw.length**2 / draw.time**2
+    draw.parameters += [f"k = {size * draw.decades(-3, -1)!r}", f"n = {1 / draw.time!r}"]
+    torques = [
+        '["-k*abs(wx)*wx/n^2", "-k*abs(wy)*wy/n^2", "-k*abs(wz)*wz/n^2"]',
+        '["-k*sign(wx)", "0", "-0.5*k*sign(wz)"]',
+        '["k*max(qx*qw, 0)", "k*min(wy/n, 0.2)", "0"]',
+        '["0", "k*abs(sin(n*t))", "k*sqrt((wx-0.1*n)^2)/n"]',
     ]
-    torque = draw.random.choice(
-        [
-            '["-k*abs(wx)*wx/n^2", "-k*abs(wy)*wy/n^2", "-k*abs(wz)*wz/n^2"]',
-            '["-k*sign(wx)", "0", "-0.5*k*sign(wz)"]',
-            '["k*max(qx*qw, 0)", "k*min(wy/n, 0.2)", "0"]',
-            '["0", "k*abs(sin(n*t))", "k*sqrt((wx-0.1*n)^2)/n"]',
-        ]
-    )
-    draw.load("torque", f"components = {torque}")
+    draw.load("torque", f"components = {draw.random.choice(torques)}")
 
 
 def _signed(draw: Draw) -> None:
@@ -197,14 +193,12 @@ def _signed(draw: Draw) -> None:
     draw.body(draw.moments())
     draw.start(draw.direction())
     draw.parameters += [f"k = {draw.mass * draw.length**2 / draw.time**2 * draw.decades(-2, -0.3)!r}"]
-    torque = draw.random.choice(
-        [
-            '["k*qx*qw", "0", "0.4*k*qw^2"]',
-            '["k*sign(qw)*qx", "0", "0.4*k*abs(qw)"]',
-            '["k*qx", "0", "0.4*k*qw"]',
-        ]
-    )
-    draw.load("torque", f"components = {torque}")
+    torques = [
+        '["k*qx*qw", "0", "0.4*k*qw^2"]',
+        '["k*sign(qw)*qx", "0", "0.4*k*abs(qw)"]',
+        '["k*qx", "0", "0.4*k*qw"]',
+    ]
+    draw.load("torque", f"components = {draw.random.choice(torques)}")
 
 
 def _ephemeris(draw: Draw) -> None:

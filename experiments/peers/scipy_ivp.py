@@ -7,7 +7,7 @@ import numba
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from experiments.peers.compiled import right_hand_side
+from experiments.peers.numba_dop853 import right_hand_side
 from experiments.peers.scenes import Scene
 
 TITLES = {

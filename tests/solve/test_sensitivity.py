@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from support import cases, run_text
 
-from experiments.sensitivity_campaign import BOUND, checked
-from experiments.sensitivity_scenes import case
+from experiments.sensitivity_campaign import BOUND, case, checked
 from rigidsim import ConfigError
 from rigidsim.scene.rotations import rotation_matrix
 from rigidsim.solve.problem import prepare
