@@ -5,6 +5,7 @@ ephemerides from mean elements, librations and a fluid core from the linearised 
 free core nutation to the wobble (Poincare 1910; Sasao, Okubo & Saito 1980).
 """
 
+from dataclasses import dataclass
 from typing import Any
 
 import mpmath
@@ -128,31 +129,70 @@ def _delaunay(scene: Scene) -> list[Known]:
 
 def _of_spin(scene: Scene) -> list[Known]:
     """Spin and wobble of a body that turns about its axis of largest or smallest moment, without torques."""
-    context = scene.context
-    moments, axes = scene.body.principal_moments, scene.body.principal_axes
-    rates = [dot(axis, scene.angular_velocity) for axis in axes]
-    order = sorted(range(3), key=lambda i: moments[i])
-    for axis, across in ((order[2], order[:2]), (order[0], order[1:])):
-        third = rates[axis]
-        a, b, c = moments[across[0]], moments[across[1]], moments[axis]
-        if abs(third) <= 3 * context.hypot(rates[across[0]], rates[across[1]]):
-            continue
-        symmetric = abs(a - b) <= _SYMMETRIC * c
-        change = _spin_change(scene, third, rates, axis, [a, b, c])
-        source = "initial rate about the principal axis"
-        rough, errors = (_SPIN, (0.0, 0.0)) if change is None else (0.0, change)
-        where = "body" if symmetric and change is not None else ""
-        found = [Known("spin", abs(third), rough, source, float(errors[0] * abs(third)), where)]
-        if a > 0 and b > 0 and (c - a) * (c - b) > 0:
-            wobble = abs(third) * context.sqrt((c - a) * (c - b) / (a * b))
-            source, error = "free nutation: w sqrt((C-A)(C-B)/(A B))", float(errors[1] * wobble)
-            found.append(Known("wobble", wobble, rough, source, error, "" if change is None else "body"))
-            if change is not None:  # its counterpart, nearly as fast as the spin
-                total = abs(third) + (wobble if c > a else -wobble)
-                source = "free nutation in space: the spin with the wobble"
-                found.append(Known("free_nutation", total, 0.0, source, error + found[0].error, "space"))
-        return found
-    return []
+    context, axes = scene.context, scene.body.principal_axes
+    order = sorted(range(3), key=lambda i: scene.body.principal_moments[i])
+    turning = _turning(scene, axes[order[2]]) or _turning(scene, axes[order[0]])
+    if turning is None:
+        return []
+    spin, (a, b, c) = abs(turning.rate), turning.moments
+    change = _spin_change(scene, turning)
+    rough, errors = (_SPIN, (0.0, 0.0)) if change is None else (0.0, change)
+    where = "body" if abs(a - b) <= _SYMMETRIC * c and change is not None else ""
+    source = "initial rate about the principal axis"
+    found = [Known("spin", spin, rough, source, float(errors[0] * spin), where)]
+    if a > 0 and b > 0 and (c - a) * (c - b) > 0:
+        wobble = spin * context.sqrt((c - a) * (c - b) / (a * b))
+        source, error = "free nutation: w sqrt((C-A)(C-B)/(A B))", float(errors[1] * wobble)
+        found.append(Known("wobble", wobble, rough, source, error, "" if change is None else "body"))
+        if change is not None:  # its counterpart, nearly as fast as the spin
+            total = spin + (wobble if c > a else -wobble)
+            source = "free nutation in space: the spin with the wobble"
+            found.append(Known("free_nutation", total, 0.0, source, error + found[0].error, "space"))
+    return found
+
+
+@dataclass(frozen=True)
+class _Turning:
+    """A rotation about a principal axis: its rate, rad/s, moments across the axis (the least first) and along
+    it, and the square of the rate across relative to that along it.
+    """
+
+    rate: Any
+    moments: Vector
+    tumbling: float
+
+
+def _turning(scene: Scene, axis: Vector) -> _Turning | None:
+    """The rotation about an axis; None where the body turns otherwise."""
+    rate = dot(axis, scene.angular_velocity)
+    across = norm(scene.context, [w - rate * x for w, x in zip(scene.angular_velocity, axis, strict=True)])
+    if abs(rate) * _NEAR <= across:
+        return None
+    largest = max(range(3), key=lambda i: abs(dot(axis, scene.body.principal_axes[i])))
+    moments = scene.body.principal_moments
+    low, high = sorted(moments[i] for i in range(3) if i != largest)
+    return _Turning(rate, [low, high, moments[largest]], float((across / rate) ** 2))
+
+
+def _spin_change(scene: Scene, turning: _Turning, known: type | None = None) -> tuple[float, float] | None:
+    """Relative errors of the spin about a principal axis as at the start, and of the torque-free wobble.
+
+    None where other torques than gravity gradients (and a ``known`` type, or beside others) act, or where
+    the amplitude of a body without symmetry counts.
+    """
+    low, high, polar = turning.moments
+    tides = scene.context.zero
+    for load in loads_of(scene):
+        source = load.gradient_source
+        if source is not None:
+            distance = source.placement.nearest(scene.context)
+            tides += 3 * source.gravitational_parameter / distance**3 / turning.rate**2
+        elif known is None or not (load.beside or isinstance(load, known)):
+            return None
+    uneven = float(abs(high - low) / polar)
+    if uneven > _SYMMETRIC and turning.tumbling > _SMALL:
+        return None
+    return uneven * (turning.tumbling + float(tides)), _SMALL + float(tides)
 
 
 def _modes_of_core(scene: Scene) -> list[Known]:
@@ -163,10 +203,8 @@ def _modes_of_core(scene: Scene) -> list[Known]:
     turning = None if core is None else _turning(scene, core.axis)
     if core is None or turning is None:
         return []
-    spin, moments = turning
-    rates = [dot(axis, scene.angular_velocity) for axis in scene.body.principal_axes]
-    largest = max(range(3), key=lambda i: abs(dot(core.axis, scene.body.principal_axes[i])))
-    change = _spin_change(scene, spin, rates, largest, moments, FluidCore)
+    spin, moments = turning.rate, turning.moments
+    change = _spin_change(scene, turning, FluidCore)
     found = _core_modes(scene, core, spin, moments)
     if found is None:
         return []
@@ -187,54 +225,9 @@ def _modes_of_core(scene: Scene) -> list[Known]:
     if not _librations(scene):
         known.append(Known("wobble", wobble, rough, source, errors[0], where))
         if exact:
-            known.append(
-                Known(
-                    "free_nutation", wobble + spin, rough, f"{source}, in space", errors[0] + error, "space"
-                )
-            )
+            total = errors[0] + error
+            known.append(Known("free_nutation", wobble + spin, rough, f"{source}, in space", total, "space"))
     return known
-
-
-def _spin_change(
-    scene: Scene, spin: Any, rates: Vector, axis: int, moments: Vector, known: type | None = None
-) -> tuple[float, float] | None:
-    """Relative errors of the spin about a principal axis as at the start, and of the torque-free wobble.
-
-    None where other torques than gravity gradients (and a `known` type, or beside others) act, or where
-    the amplitude of a body without symmetry counts.
-
-    Args:
-        rates: along all principal axes, rad/s; moments: across the axis, and along it.
-    """
-    context = scene.context
-    low, high, polar = moments
-    tides = context.zero
-    for load in loads_of(scene):
-        source = load.gradient_source
-        if source is not None:
-            distance = source.placement.nearest(context)
-            tides += 3 * source.gravitational_parameter / distance**3 / spin**2
-        elif known is None or not (load.beside or isinstance(load, known)):
-            return None
-    uneven = float(abs(high - low) / polar)
-    tumbling = float(sum(w**2 for k, w in enumerate(rates) if k != axis) / spin**2)
-    if uneven > _SYMMETRIC and tumbling > _SMALL:
-        return None
-    return uneven * (tumbling + float(tides)), _SMALL + float(tides)
-
-
-def _turning(scene: Scene, axis: Vector) -> tuple[Any, Vector] | None:
-    """Rate about an axis (rad/s) and the body's moments across and along it, the least first; None where the
-    rotation isn't about it.
-    """
-    rate = dot(axis, scene.angular_velocity)
-    across = [w - rate * x for w, x in zip(scene.angular_velocity, axis, strict=True)]
-    if abs(rate) * _NEAR <= norm(scene.context, across):
-        return None
-    largest = max(range(3), key=lambda i: abs(dot(axis, scene.body.principal_axes[i])))
-    moments = scene.body.principal_moments
-    low, high = sorted(moments[i] for i in range(3) if i != largest)
-    return rate, [low, high, moments[largest]]
 
 
 def _core_modes(scene: Scene, core: FluidCore, spin: Any, moments: Vector) -> Any:
@@ -284,8 +277,10 @@ def _librations(scene: Scene, alone: Any = None, node_rate: Any = None) -> list[
     """
     context, body = scene.context, scene.body
     z = max(range(3), key=lambda i: abs(dot(body.principal_axes[i], scene.angular_velocity)))
-    turning = None if scene.free_flight else _turning(scene, body.principal_axes[z])
-    for load in loads_of(scene) if turning is not None else ():
+    turning = _turning(scene, body.principal_axes[z])
+    if turning is None or scene.free_flight:
+        return []
+    for load in loads_of(scene):
         source = load.gradient_source
         if source is None:
             continue
@@ -295,11 +290,11 @@ def _librations(scene: Scene, alone: Any = None, node_rate: Any = None) -> list[
         facing = {i: abs(dot(body.principal_axes[i], towards)) for i in range(3) if i != z}
         x = max(facing, key=facing.__getitem__)
         a, b, c = (body.principal_moments[i] for i in (x, 3 - x - z, z))
-        in_step = source.gravitational_parameter / distance**3 / turning[0] ** 2
+        in_step = source.gravitational_parameter / distance**3 / turning.rate**2
         if a == 0 or facing[x] < _FACING or abs(in_step - 1) > _IN_STEP:
             continue
         orbit = load.orbit
-        n = abs(turning[0]) if orbit is None else orbit.mean_motion + orbit.periapsis_rate + orbit.node_rate
+        n = abs(turning.rate) if orbit is None else orbit.mean_motion + orbit.periapsis_rate + orbit.node_rate
         sx, sz = (c - a) / b, (c - b) / a
         half, product = (1 + 3 * sx + sx * sz) / 2, 4 * sx * sz
         both = half**2 - product

@@ -257,7 +257,7 @@ def test_bad_rows_are_refused_by_their_line(here: Path) -> None:
 WRONG = {
     'parameters = ["body.moments"]': "principal_moments",
     'parameters = ["time.end"]': "no number of the motion",
-    'parameters = ["initial.angular_velocity", "initial.angular_velocity[1]"]': "given twice",
+    'parameters = ["initial.angular_velocity", "initial.angular_velocity[1]"]': "another key stands for",
     'parameters = ["initial.angular_velocity[0]"]\nprior."body.principal_moments" = {sigma = 1}': (
         "not among the parameters"
     ),

@@ -16,9 +16,9 @@ from rigidsim.solve.from_states import FromStates, NotFromStates
 from rigidsim.store.outputs import refuse_loss, writing
 from rigidsim.store.run import Run
 from rigidsim.workflows.compare.as_run import dataset_of_rows, files_of, trajectory_given
-from rigidsim.workflows.compare.columns import Attitudes, attitudes_of, size_of
+from rigidsim.workflows.compare.columns import LEAST_ROWS, Attitudes, attitudes_of, size_of
 from rigidsim.workflows.compare.conventions import Convention, find_convention
-from rigidsim.workflows.compare.evidence import Evidence, OwnMotion
+from rigidsim.workflows.compare.evidence import Evidence
 from rigidsim.workflows.compare.result import (
     INTEGRATION_ERROR,
     AttitudeError,
@@ -35,6 +35,7 @@ from rigidsim.workflows.run import run
 WITHIN = 1e-9
 """Largest angle (rad) between attitudes that agree, if nothing else is asked for."""
 FIGURES = (".png", ".svg")
+_ENDINGS = {"figure_file": FIGURES, "timeline_file": (".rrd",)}
 _FAR_AWAY = 10.0  # spans of the file or of the experiment, beyond which times are counted from another zero
 _MOST_SHOWN = 20_000  # rows of a timeline
 
@@ -70,8 +71,10 @@ def compare(
         RigidsimError: the trajectory can't be used, or a file would be replaced, and what to do.
     """
     asked = as_experiment(experiment)
-    place, picture, drawn = (None if path is None else Path(path) for path in (out, figure, timeline))
-    _refuse_targets(place, picture, drawn, [*asked.files, *files_of(table, kernels)], force=force)
+    written = {"dataset_file": out, "figure_file": figure, "timeline_file": timeline}
+    paths = {name: Path(path) for name, path in written.items() if path is not None}
+    _refuse_names(paths)
+    refuse_loss(paths.values(), [*asked.files, *files_of(table, kernels)], force=force)
     quiet, scene = _plain(asked)
     given = attitudes_of(trajectory_given(table, scene, kernels), scene.epoch)
     if not 0 < within < np.pi:
@@ -80,41 +83,38 @@ def compare(
     told = list(given.told)
     if given.time_unit is None:
         told.append("times were taken for s; name a unit if they are in another: t [day]")
-    own = _own_motion(quiet, given.times, told)
-    given = given.at(slice(len(own.rates)))
-    found, more = find_convention(given, convention or {}, (own.quaternions[0], own.rates))
-    seen = Evidence(given, found, own, within, told + more)
+    own, uncertainty = _own_motion(quiet, given.times, told)
+    given = given.at(slice(own.sizes["time"]))
+    motion = own["quaternion"].values, own["angular_velocity"].values
+    found, more = find_convention(given, convention or {}, motion)
+    seen = Evidence(given, found, own, uncertainty, within, told + more)
     try:
         seen.begin_from(FromStates(scene))
     except NotFromStates as error:
         seen.why_not = str(error)
         seen.told.append(f"neither local defects nor drifts were measured: {error}")
-    result = _result(seen, asked.config.name)
-    if place is not None:
-        result = result.with_files(dataset_file=str(result.save(place)))
-    if picture is not None:
+    result = _result(seen, asked.config.name, {name: str(path) for name, path in paths.items()})
+    if out is not None:
+        result.save(out)
+    if figure is not None:
         from rigidsim.look.figures.compared import save_compared
 
-        with writing(picture) as temporary:
-            save_compared(thinned(result.dataset), temporary, file_format=picture.suffix.lower()[1:])
-        result = result.with_files(figure_file=str(picture))
-    if drawn is not None:
-        _draw(quiet, given, found, drawn)
-        result = result.with_files(timeline_file=str(drawn))
+        with writing(Path(figure)) as temporary:
+            save_compared(thinned(result.dataset), temporary, file_format=Path(figure).suffix.lower()[1:])
+    if timeline is not None:
+        _draw(quiet, given, found, Path(timeline))
     return result
 
 
-def _refuse_targets(
-    out: Path | None, figure: Path | None, timeline: Path | None, inputs: Sequence[Path], *, force: bool
-) -> None:
-    """Refuse files of the wrong kind, and those that would replace something (``store.outputs``)."""
-    if out is not None and out.suffix.lower() in FIGURES:
-        raise RigidsimError(f"{out}: the dataset is no picture; give --out FILE.h5, and --figure for that")
-    if figure is not None and figure.suffix.lower() not in FIGURES:
-        raise RigidsimError(f"{figure}: a figure is a .png or a .svg")
-    if timeline is not None and timeline.suffix.lower() != ".rrd":
-        raise RigidsimError(f"--timeline: given {timeline}; a name that ends in .rrd is allowed")
-    refuse_loss(filter(None, (out, figure, timeline)), inputs, force=force)
+def _refuse_names(paths: Mapping[str, Path]) -> None:
+    """Refuse names that end as another kind of file does."""
+    for name, path in paths.items():
+        suffix, allowed = path.suffix.lower(), _ENDINGS.get(name, ())
+        if (suffix not in allowed) if allowed else (suffix in (*FIGURES, ".rrd")):
+            kind = name.removesuffix("_file")
+            raise RigidsimError(
+                f"{kind}: given {path}; a name that ends in {' or '.join(allowed or ('.h5',))} is allowed"
+            )
 
 
 def _refuse_far(given: Attitudes, begin: float, end: float) -> None:
@@ -157,34 +157,29 @@ def _sampled(experiment: Experiment, times: np.ndarray) -> Run:
     return run(sampled, out=None, progress=False)
 
 
-def _own_motion(experiment: Experiment, times: np.ndarray, told: list[str]) -> OwnMotion:
-    """The experiment at these times, up to its end if that is earlier.
+def _own_motion(experiment: Experiment, times: np.ndarray, told: list[str]) -> tuple[xarray.Dataset, float]:
+    """The experiment at these times, up to its end if that is earlier; and the announced error of its
+    attitude, rad (0 if unknown).
 
     Raises:
         RigidsimError: the motion ends before the third of them.
     """
     made = _sampled(experiment, times)
     found, message = made.dataset, made.outcome.message
-    if found.sizes["time"] < 3:
+    if found.sizes["time"] < LEAST_ROWS:
         raise RigidsimError(f"the experiment's motion {message}, before the trajectory begins")
     if found.sizes["time"] < len(times):
         told.append(f"the experiment's motion {message}; later rows aren't compared")
     accuracy = getattr(made.outcome, "accuracy", None)
     announced = getattr(accuracy, "certified", None) or getattr(accuracy, "estimated_attitude_error", None)
-    names = [name for name in ("quaternion", "quaternion_lo", "quaternion_lo2") if name in found]
-    return OwnMotion(
-        [found[name].values for name in names],
-        found["angular_velocity"].values,
-        found["position"].values if "position" in found else None,
-        float(announced or 0.0),
-    )
+    return found, float(announced or 0.0)
 
 
 # --- the result ---------------------------------------------------------------------------------------------
 
 
-def _result(seen: Evidence, name: str) -> Comparison:
-    """Everything of it, with its dataset."""
+def _result(seen: Evidence, name: str, files: Mapping[str, str]) -> Comparison:
+    """Everything of it, with its dataset; ``files``: those that will be written."""
     trajectory, errors, source = seen.given.trajectory, seen.errors, seen.given.trajectory.source
     drifts, (verdict, why) = seen.drifts(), judged(seen)
     local, dataset = _local_defects(seen, verdict)
@@ -230,6 +225,7 @@ def _result(seen: Evidence, name: str) -> Comparison:
         if beyond.any()
         else None,
         told=seen.told,
+        **files,
     )
     made._dataset = xarray.Dataset(dataset, {"time": time}, attributes)
     return made
@@ -241,18 +237,9 @@ def _largest(values: np.ndarray | None) -> float | None:
 
 def _local_defects(seen: Evidence, verdict: str) -> tuple[LocalDefects | None, dict[str, Any]]:
     """Local defects as values, and as variables of the dataset."""
-    rows, windows, alone = seen.row_defects, seen.windows, seen.first_alone if seen.rates is None else None
-    if rows is not None:
-        starts = rows.rows
-        sizes, slips = (np.linalg.norm(values, axis=1) for values in (rows.attitude, rows.rates))
-    elif alone is not None:
-        starts, sizes, slips = alone.rows[:, 0], np.linalg.norm(alone.defects, axis=1), None
-        seen.told.append(
-            "the file has no angular velocities: defects are taken with the nearest rates, over "
-            f"{len(starts)} windows of {alone.rows.shape[1]} rows"
-        )
-    else:
+    if seen.local is None:
         return None, {}
+    (starts, sizes, slips), windows, explained = seen.local, seen.windows, seen.explained
     times = seen.times[starts]
     dataset: dict[str, Any] = {
         "defect": ("start", sizes, {"units": "rad", "long_name": "local defect of the attitude"}),
@@ -262,7 +249,6 @@ def _local_defects(seen: Evidence, verdict: str) -> tuple[LocalDefects | None, d
         words = {"units": "rad s-1", "long_name": "local defect of the angular velocity"}
         dataset["rate_defect"] = ("start", slips, words)
     at = int(np.nanargmax(sizes)) if np.isfinite(sizes).any() else 0
-    explained = seen.__dict__.get("alone")
     share = acceleration = order = tolerance = None
     if windows is not None:
         share, acceleration = unexplained_share(windows), rms(np.linalg.norm(windows.acceleration, axis=1))

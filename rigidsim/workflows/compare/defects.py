@@ -22,7 +22,6 @@ from rigidsim.solve.from_states import FromStates, RowStates
 
 _WINDOW = 0.5  # times the rate of the motion: length of a window, where the rows allow it
 _PARTS = 4  # of a window
-_MOST_RATES = 20_000  # rows that the rate of a motion is the mean of
 RESOLVED = 2.0
 """rad that the motion may turn from row to row, beyond which the rows don't show how."""
 _ENOUGH = 0.5  # share of the windows with fewer parts that suffice
@@ -68,10 +67,9 @@ class WindowDefects:
 
 def motion_rate(times: np.ndarray, rates: np.ndarray) -> float:
     """The rate of a motion, rad/s: that of its turning, or of the change of its rates, if that is faster."""
-    rows = np.unique(np.linspace(0, len(times) - 2, min(len(times) - 1, _MOST_RATES)).astype(int))
-    size = float(np.sqrt(np.mean(np.sum(rates[np.append(rows, rows[-1] + 1)] ** 2, axis=1))))
-    steps = times[rows + 1] - times[rows]
-    change = (rates[rows + 1] - rates[rows]) / steps[:, None]
+    size = float(np.sqrt(np.mean(np.sum(rates**2, axis=1))))
+    steps = np.diff(times)
+    change = np.diff(rates, axis=0) / steps[:, None]
     bend = float(np.sqrt(np.sum(change**2, axis=1) @ steps / steps.sum()))
     return max(size, bend / size if size else 0.0)
 
@@ -89,20 +87,16 @@ def windows_of_rows(times: np.ndarray, rate: float, length: float, parts: int, m
     goals = times[starts][:, None] + length / rate * steps / parts
     rows = np.maximum.accumulate(np.searchsorted(times, goals) - steps, axis=1) + steps
     rows = rows[rows[:, -1] < count]
-    gaps = np.diff(times[rows.ravel()].reshape(rows.shape), axis=1).max(axis=1, initial=0.0)
+    gaps = np.diff(times[rows], axis=1).max(axis=1, initial=0.0)
     return np.asarray(rows[gaps * rate < RESOLVED])
 
 
 def row_defects(equations: FromStates, times: np.ndarray, states: RowStates, rows: np.ndarray) -> RowDefects:
     """Defects from some rows to the next ones; ``states`` are the trajectory's."""
-    ends = ends_of(equations, states[rows], times[rows], times[rows + 1])
+    begun = zip(states[rows], times[rows], times[rows + 1, None], strict=True)
+    ends = np.stack([equations.after(*one)[0] for one in begun])
     attitude, rates = _apart(equations, states[rows + 1], ends)
     return RowDefects(rows, attitude, rates)
-
-
-def ends_of(equations: FromStates, begun: np.ndarray, times: np.ndarray, until: np.ndarray) -> np.ndarray:
-    """States (rows, states) where the equations lead from states at times (s) to others."""
-    return np.stack([equations.after(*one)[0] for one in zip(begun, times, until[:, None], strict=True)])
 
 
 def window_defects(

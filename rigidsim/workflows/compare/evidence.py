@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import xarray
 
+from rigidsim.accuracy.comparison import parts_of
 from rigidsim.scene.row_rotations import angles_between, normalised
 from rigidsim.solve.from_states import FromStates, RowStates
 from rigidsim.workflows.compare import defects
@@ -36,39 +38,27 @@ _SIMILAR = 300.0  # ratio of large defects to small ones, up to which they are h
 _NORM = "quaternion_norm"
 
 
-@dataclass(frozen=True)
-class OwnMotion:
-    """The experiment at the trajectory's times.
-
-    Attributes:
-        quaternions: float64 parts (rows, 4) each, w x y z, whose sum is the attitude.
-        rates: (rows, 3), rad/s, body axes. position: (rows, 3), m; None without flight.
-        uncertainty: announced error of its attitude at the end, rad; 0 if unknown.
-    """
-
-    quaternions: list[np.ndarray]
-    rates: np.ndarray
-    position: np.ndarray | None
-    uncertainty: float
-
-
 @dataclass
 class Evidence:
     """A trajectory in a convention beside the experiment's motion; all else is worked out when needed.
 
     Attributes:
+        own: the experiment at the trajectory's times. uncertainty: announced error of its attitude, rad.
         within: rad, what attitudes may differ by and agree. told: gets what a user should know.
         states: the rows as states of the experiment's equations; None where these can't begin from attitude
             and rates, for the reason ``why_not``.
+        explained: windows of attitudes alone, once it was tried what explains their defects.
     """
 
     given: Attitudes
     convention: Convention
-    own: OwnMotion
+    own: xarray.Dataset
+    uncertainty: float
     within: float
     told: list[str]
     states: RowStates | None = None
     why_not: str = ""
+    explained: WindowsOfAttitudes | None = None
 
     # --- beside the experiment ------------------------------------------------------------------------------
 
@@ -95,8 +85,13 @@ class Evidence:
 
     @cached_property
     def _vectors(self) -> np.ndarray:
-        first, *more = self.own.quaternions
+        first, *more = parts_of(self.own, "quaternion", np.arange(len(self.times)))
         return rotation_vectors([normalised(first), *more], [self.quaternions])
+
+    @property
+    def own_rates(self) -> np.ndarray:
+        """Of the experiment, (rows, 3), rad/s, body axes."""
+        return np.asarray(self.own["angular_velocity"].values)
 
     @cached_property
     def errors(self) -> np.ndarray:
@@ -106,13 +101,15 @@ class Evidence:
     @cached_property
     def rate_errors(self) -> np.ndarray | None:
         """(rows,), rad/s."""
-        return None if self.rates is None else np.asarray(np.linalg.norm(self.rates - self.own.rates, axis=1))
+        return None if self.rates is None else np.asarray(np.linalg.norm(self.rates - self.own_rates, axis=1))
 
     @cached_property
     def position_errors(self) -> np.ndarray | None:
         """(rows,), m."""
-        theirs, own = self.given.positions, self.own.position
-        return None if theirs is None or own is None else np.asarray(np.linalg.norm(theirs - own, axis=1))
+        theirs = self.given.positions
+        if theirs is None or "position" not in self.own:
+            return None
+        return np.asarray(np.linalg.norm(theirs - self.own["position"].values, axis=1))
 
     @cached_property
     def rate(self) -> float:
@@ -120,12 +117,12 @@ class Evidence:
         steps = np.diff(self.times)
         turns = angles_between(self.quaternions[:-1], self.quaternions[1:])
         seen = float(np.sqrt(np.sum(turns**2 / steps) / self.span))
-        return max(defects.motion_rate(self.times, self.own.rates), seen, _SLOWEST / self.span)
+        return max(defects.motion_rate(self.times, self.own_rates), seen, _SLOWEST / self.span)
 
     @cached_property
     def turn(self) -> float:
         """From row to row, rad (median), by the faster of both motions."""
-        both = [self.own.rates] if self.rates is None else [self.own.rates, self.rates]
+        both = [self.own_rates] if self.rates is None else [self.own_rates, self.rates]
         fastest = np.max([np.linalg.norm(x, axis=1) for x in both], axis=0)
         return float(np.median(fastest[:-1] * np.diff(self.times)))
 
@@ -154,7 +151,7 @@ class Evidence:
     @cached_property
     def floor(self) -> tuple[float, str]:
         """What attitudes may differ by and agree, rad, and why."""
-        floor = max(self.within, 4 * self.resolution, 3 * self.own.uncertainty)
+        floor = max(self.within, 4 * self.resolution, 3 * self.uncertainty)
         if self.errors.max() > floor and (rounded := self._rounded_times(floor)) is not None:
             why = (
                 f"the attitude error comes from its times, which are rounded ({self.given.resolution[2]:.2g}"
@@ -168,7 +165,7 @@ class Evidence:
         Attitudes at a time that is off by d are turned by the rate times d. Rounded times are off by half
         their last digit at most, by another amount in each row. Even times show no rounding.
         """
-        most, rates = self.given.resolution[2], self.own.rates
+        most, rates = self.given.resolution[2], self.own_rates
         even = np.linspace(self.times[0], self.times[-1], len(self.times))
         size = np.maximum(np.linalg.norm(rates, axis=1), 1e-150)
         shifts = np.sum(self._vectors * rates, axis=1) / size**2
@@ -189,7 +186,7 @@ class Evidence:
         Raises:
             NotFromStates: the experiment's motion ends before.
         """
-        given, rates = self.given, self.own.rates if self.rates is None else self.rates
+        given, rates = self.given, self.own_rates if self.rates is None else self.rates
         flight = None
         if given.positions is not None and given.velocities is not None:
             flight = np.concatenate([given.positions, given.velocities], axis=1)
@@ -211,17 +208,28 @@ class Evidence:
         return found
 
     @cached_property
-    def row_defects(self) -> defects.RowDefects | None:
-        """From rows to the next ones; None without rates."""
-        if self.rates is None or self.states is None:
+    def local(self) -> tuple[np.ndarray, np.ndarray, np.ndarray | None] | None:
+        """Rows that local defects begin at, the attitude's (rad) to the next rows, and the rates' (rad/s);
+        without rates those of the shortest windows. None where rows are too far apart.
+        """
+        if self.states is None:
             return None
+        if self.rates is None:
+            if (alone := self.first_alone) is None:
+                return None
+            self.told.append(
+                "the file has no angular velocities: defects are taken with the nearest rates, over "
+                f"{len(alone.rows)} windows of {alone.rows.shape[1]} rows"
+            )
+            return alone.rows[:, 0], np.linalg.norm(alone.defects, axis=1), None
         count = len(self.times) - 1
         starts = np.unique(np.linspace(0, count - 1, min(count, _MOST_STARTS)).astype(int))
         near = starts[np.diff(self.times)[starts] * self.rate < defects.RESOLVED]
         starts = near if len(near) else starts
         if len(starts) < count:
             self.told.append(f"local defects were measured from {len(starts):,} of {count:,} rows")
-        return defects.row_defects(self.states.equations, self.times, self.states, starts)
+        found = defects.row_defects(self.states.equations, self.times, self.states, starts)
+        return starts, np.linalg.norm(found.attitude, axis=1), np.linalg.norm(found.rates, axis=1)
 
     @cached_property
     def windows(self) -> defects.WindowDefects | None:
@@ -245,6 +253,7 @@ class Evidence:
             found = self._alone(length) or found
         if found is not None and found.size > ABOVE * self.attitude_noise:
             found.explain(self.attitude_noise, STEADY if span >= _LONG else MOMENTS)
+            self.explained = found
         return found
 
     def _alone(self, length: float) -> WindowsOfAttitudes | None:
@@ -268,9 +277,9 @@ class Evidence:
         A method of order p errs by a multiple of h^(p+1) in a step h. Where steps are chosen by the error,
         defects are about as large whatever the interval. Equal intervals show neither.
         """
-        rows = self.row_defects
-        assert rows is not None
-        sizes, intervals = np.linalg.norm(rows.attitude, axis=1), np.diff(self.times)[rows.rows]
+        assert self.local is not None
+        starts, sizes, _ = self.local
+        intervals = np.diff(self.times)[starts]
         seen = np.isfinite(sizes) & (sizes > ABOVE * self.attitude_noise)
         if seen.sum() < max(_LEAST_ROWS, len(seen) / 2):
             return None, None

@@ -130,12 +130,6 @@ class Comparison(SummaryPart):
             self.dataset.to_netcdf(temporary, engine="h5netcdf")
         return Path(path)
 
-    def with_files(self, **names: str) -> Comparison:
-        """The same with the names of files that were written."""
-        made = self.having(**names)
-        made._dataset = self._dataset
-        return made
-
     def __repr__(self) -> str:
         error = self.attitude_error
         return (

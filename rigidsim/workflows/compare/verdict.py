@@ -123,7 +123,7 @@ def _elsewhere(seen: Evidence, slip: float, attitude: float, rates: float, lengt
 
 def _elsewhere_alone(seen: Evidence, windows: WindowsOfAttitudes) -> Verdict | None:
     """Of attitudes alone whose first rates differ, where their defects are nothing."""
-    slip = float(np.linalg.norm(windows.rates[0] - seen.own.rates[windows.rows[0, 0]]))
+    slip = float(np.linalg.norm(windows.rates[0] - seen.own_rates[windows.rows[0, 0]]))
     size, length = windows.size, windows.length
     if slip * length <= _SURE * size and seen.errors[0] <= seen.floor[0]:
         return None

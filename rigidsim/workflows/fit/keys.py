@@ -14,7 +14,7 @@ from rigidsim.scene.config import Experiment, validated
 from rigidsim.scene.exact import parse_number
 from rigidsim.scene.fit_table import KnownWithin
 from rigidsim.scene.row_rotations import multiplied, of_vector
-from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.scene.scene import build_scene
 from rigidsim.scene.toml_text import apply_overrides, parse_toml
 from rigidsim.scene.units import powers, unit_text
 from rigidsim.scene.validation_messages import shown
@@ -50,6 +50,7 @@ class FitKeys:
 
     Attributes:
         estimated: those of ``[fit] parameters``. considered: those of ``[fit] consider``.
+        scene: of the config's values.
     """
 
     def __init__(self, experiment: Experiment) -> None:
@@ -59,15 +60,10 @@ class FitKeys:
             raise ConfigError(Problem("[fit]", what), experiment.source)
         self._experiment = experiment
         self._tables = parse_toml(experiment.text, experiment.source)
-        self._scene = build_scene(experiment)
-        refuse_backwards(self._scene, experiment.source)
-        self._problems: list[Problem] = []
-        self.estimated = self._all("parameters", table.parameters, table.prior)
-        self.considered = self._all("consider", list(table.consider), table.consider)
-        if not self._problems:  # otherwise a key that was refused would seem not to be there
-            self._refuse_rest(table.prior)
-        if self._problems:
-            raise ConfigError(self._problems, experiment.source)
+        self.scene = build_scene(experiment)
+        refuse_backwards(self.scene, experiment.source)
+        self.estimated = self._all("parameters", table.parameters, "prior", table.prior)
+        self.considered = self._all("consider", list(table.consider), "consider", table.consider)
         self._turned = any(one.key.startswith(ATTITUDE) for one in self.all)
 
     @property
@@ -75,51 +71,43 @@ class FitKeys:
         """Estimated ones, then considered ones."""
         return (*self.estimated, *self.considered)
 
-    @property
-    def scene(self) -> Scene:
-        """The scene of the config's values."""
-        return self._scene
-
     # --- reading --------------------------------------------------------------------------------------------
 
-    def _all(self, where: str, keys: Sequence[str], sigmas: Mapping[str, KnownWithin]) -> tuple[FitKey, ...]:
-        found: list[FitKey] = []
-        known = "prior" if where == "parameters" else where
-        for key in keys:
-            at = f'[fit] {where} "{key[:60]}"'
+    def _all(
+        self, where: str, keys: Sequence[str], known: str, sigmas: Mapping[str, KnownWithin]
+    ) -> tuple[FitKey, ...]:
+        every = varied_keys(self._experiment, keys, f"[fit] {where}")
+        found, problems = {one.name: self._one(one) for one in every}, []
+        for key, table in sorted(sigmas.items(), key=lambda item: len(item[0])):  # components override
+            plain = key.replace(" ", "")
+            members = [one for one in every if one.name == plain or one.name.startswith(f"{plain}[")]
+            given = table.sigma if isinstance(table.sigma, list) else [table.sigma] * len(members)
             try:
-                every = varied_keys(self._experiment, [key], f"[fit] {where}")
-                at = f'[fit] {known}."{key[:60]}"'
-                found += [self._one(one, _given(sigmas, one, key, n)) for n, one in enumerate(every)]
+                if not members:
+                    raise ValueError("is not among the parameters; name it there, or remove its prior")
+                if len(given) != len(members):
+                    raise ValueError(f"given {shown(given)} as sigma; one for each component is needed")
+                for one, value in zip(members, given, strict=True):
+                    sigma = _sigma(value, one, self._parameter(one))
+                    found[one.name] = replace(found[one.name], sigma=sigma)
             except ValueError as error:
-                self._problems.append(Problem(at, str(error)))
-            except ConfigError as error:
-                self._problems += error.problems
-        names = [one.key for one in found]
-        for name in sorted({name for name in names if names.count(name) > 1}):
-            self._problems.append(Problem(f"[fit] {where}", f'"{name}" is given twice; give it once'))
-        return tuple(found)
+                problems.append(Problem(f'[fit] {known}."{key[:60]}"', str(error)))
+        if problems:
+            raise ConfigError(problems, self._experiment.source)
+        return tuple(found.values())
 
-    def _one(self, varied: VariedKey, sigma: Any) -> FitKey:
-        suffix, unit = "", varied.unit
+    def _parameter(self, varied: VariedKey) -> Any:
         table, _, name = varied.name.partition(".")
-        given = self._experiment.config.parameters.get(name) if table == "parameters" else None
+        return self._experiment.config.parameters.get(name) if table == "parameters" else None
+
+    def _one(self, varied: VariedKey) -> FitKey:
+        suffix, unit, given = "", varied.unit, self._parameter(varied)
         if given is not None and given.unit:  # constants of expressions have units of their own
             found = unit_text(powers(given.unit)) or "rad"
             suffix = unit = f"rad{found[1:]}" if found.startswith("1/") else found
-        known = None if sigma is None else _sigma(sigma, varied, given)
-        places = [str(place) for place in varied.places]
+        places = tuple(str(place) for place in varied.places)
         size = abs(float(varied.number)) or abs(float(varied.size)) or 1.0
-        return FitKey(varied.name, unit, float(varied.number), known, suffix, tuple(places), size)
-
-    def _refuse_rest(self, prior: Mapping[str, KnownWithin]) -> None:
-        """A prior of something that isn't estimated would be without effect."""
-        known = {one.key for one in self.estimated}
-        known |= {key.rpartition("[")[0] for key in known}
-        for key in prior:
-            if key.replace(" ", "") not in known:
-                what = "is not among the parameters; name it there, or remove its prior"
-                self._problems.append(Problem(f'[fit] prior."{key[:60]}"', what))
+        return FitKey(varied.name, unit, float(varied.number), None, suffix, places, size)
 
     # --- other values ---------------------------------------------------------------------------------------
 
@@ -138,12 +126,12 @@ class FitKeys:
 
     def _start(self, turn: np.ndarray) -> list[str]:
         """The attitude at the start turned by a rotation vector, instead of whatever gives it."""
-        initial = self._scene.config.initial
-        given = np.array([float(x) for x in self._scene.quaternion])
+        initial = self.scene.config.initial
+        given = np.array([float(x) for x in self.scene.quaternion])
         quaternion = multiplied(given[None, :], of_vector(turn[None, :]))[0]
         texts = [f"initial.{name}=" for name in _FORMS if getattr(initial, name) is not None]
         if initial.spin_period is not None:
-            rates = ", ".join(repr(float(w)) for w in self._scene.angular_velocity)
+            rates = ", ".join(repr(float(w)) for w in self.scene.angular_velocity)
             texts += ["initial.spin_period=", f"initial.angular_velocity=[{rates}]"]
         shown_values = ", ".join(repr(float(x)) for x in quaternion)
         return [*texts, f"initial.quaternion=[{shown_values}]"]
@@ -158,19 +146,6 @@ class FitKeys:
         """The config with estimated values written in, and without ``[fit]``."""
         everything = [*values, *(one.start for one in self.considered)]
         return self._experiment.having(["fit=", *self.overrides(everything)])
-
-
-def _given(sigmas: Mapping[str, KnownWithin], varied: VariedKey, key: str, index: int) -> Any:
-    """What is known beforehand of a number, by its own key or by that of its vector, as written."""
-    plain = {name.replace(" ", ""): table for name, table in sigmas.items()}
-    table = (
-        plain.get(varied.name) or plain.get(key.replace(" ", "")) or plain.get(varied.name.rpartition("[")[0])
-    )
-    if table is None or not isinstance(table.sigma, list):
-        return table and table.sigma
-    if index >= len(table.sigma):
-        raise ValueError(f"given {shown(table.sigma)} as sigma; one for each component is needed")
-    return table.sigma[index]
 
 
 def _sigma(given: Any, varied: VariedKey, parameter: Any) -> float:

@@ -167,8 +167,13 @@ class ByTangents:
             stepping, self._keys, record=self._names, quickly=True, where="[fit] parameters"
         )
 
-    def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Prediction:
+    def at(
+        self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True, names: Sequence[str] = ()
+    ) -> Prediction:
         """Predictions, with derivatives if these are asked for, at ascending times (s).
+
+        Args:
+            names: of variables, as far as the scene has them; by default those observed.
 
         Raises:
             NotPredicted: the motion doesn't get there.
@@ -181,7 +186,9 @@ class ByTangents:
         except ConfigError as error:
             raise NotPredicted("; ".join(problem.what for problem in error.problems)) from None
         made = Prediction({})
-        for name in dict.fromkeys([*self._names, *(name for name in ALONG if name in rows.values)]):
+        for name in names or self._names:
+            if name not in rows.values:
+                continue
             value = rows.values[name].astype(float)
             made.values[name] = normalised(value) if name == QUATERNION else value
             found = [value]
@@ -198,7 +205,7 @@ class ByTangents:
 
     def along(self, values: Sequence[float], times: np.ndarray) -> Prediction:
         """The same, with attitude, angular velocity and position, as far as the scene has them."""
-        return self.at(values, times)
+        return self.at(values, times, names=ALONG)
 
 
 def difference(quantity: Observed, one: np.ndarray, other: np.ndarray) -> np.ndarray:

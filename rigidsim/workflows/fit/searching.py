@@ -10,11 +10,9 @@ import numpy as np
 from rigidsim.errors import RigidsimError
 from rigidsim.workflows.fit.estimation import Ended, Linear, iterate
 from rigidsim.workflows.fit.keys import FitKeys
-from rigidsim.workflows.fit.observed import QUATERNION
-from rigidsim.workflows.fit.predictions import ALONG, NotPredicted, Prediction, Predictor, difference
+from rigidsim.workflows.fit.predictions import NotPredicted, Prediction, Predictor, difference
 from rigidsim.workflows.fit.readings import Readings
 
-_FURTHER = 1.5  # times the span of the data, up to which predictions along the run come with them
 _SMALL = 1e-4  # rad, below which the series of a function of an angle is right to rounding
 _ROUNDS = 25
 _FROM_START = 40  # iterations from each of several starts
@@ -39,16 +37,10 @@ class Residuals:
 class Weighing:
     """Readings of all sets, and what an experiment predicts for them."""
 
-    def __init__(
-        self, keys: FitKeys, readings: Sequence[Readings], predictor: Predictor, along: np.ndarray
-    ) -> None:
+    def __init__(self, keys: FitKeys, readings: Sequence[Readings], predictor: Predictor) -> None:
         self.keys, self.readings, self._predictor = keys, list(readings), predictor
-        begin, last = float(keys.scene.start), max(float(r.times[-1]) for r in readings)
-        near = along[-1] - begin <= _FURTHER * (last - begin)  # a longer way isn't gone in each evaluation
-        parts = [*(r.times for r in readings), along if near else along[:0]]
-        self.times, places = np.unique(np.concatenate(parts), return_inverse=True)
-        *self._places, self._along = np.split(places, np.cumsum([len(part) for part in parts])[:-1])
-        self._along_times = along
+        self.times, places = np.unique(np.concatenate([r.times for r in readings]), return_inverse=True)
+        self._places = np.split(places, np.cumsum([len(r.times) for r in readings])[:-1])
         self.used = [np.ones(len(r.times), dtype=bool) for r in readings]
         self._count = len(keys.estimated)
         self._start = np.array([one.start for one in keys.estimated])
@@ -76,26 +68,12 @@ class Weighing:
         self._latest = values.tobytes(), self._beside(found)
         return self._latest[1]
 
-    def along(self, values: np.ndarray) -> Prediction:
-        """Predictions with derivatives along the run, as far as the scene has them: of the latest evaluation,
-        which is that of the values where a fit ends.
-        """
-        found = self._sloped
-        if (
-            found is None
-            or not len(self._along)
-            or QUATERNION not in found.values
-            or "angular_velocity" not in found.values
-        ):
-            try:
-                return self._predictor.along([*values, *self._fixed], self._along_times)
-            except NotPredicted:
-                return Prediction({})
-        names = [name for name in ALONG if name in found.values]
-        return Prediction(
-            {name: found.values[name][self._along] for name in names},
-            {name: found.slopes[name][self._along] for name in names},
-        )
+    def along(self, values: np.ndarray, times: np.ndarray) -> Prediction:
+        """Predictions with derivatives along the run, as far as the scene has them."""
+        try:
+            return self._predictor.along([*values, *self._fixed], times)
+        except NotPredicted:
+            return Prediction({})
 
     def _beside(self, found: Prediction) -> Residuals:
         parts = [self._set(r, p, found) for r, p in zip(self.readings, self._places, strict=True)]

@@ -152,7 +152,7 @@ def _tried(models: Models, alone: Mapping[str, ModelRun], most: float) -> list[C
         for code in sorted(alone, key=lambda code: alone[code].largest):
             more = outermost(models.effects, [*left_out, code])
             left_out = more if set(more) <= set(alone) and summed(more) <= most else left_out
-    tried = []
+    tried: list[ComparedModel] = []
     while not tried or not tried[-1].within:
         with suppress(ConfigError):  # a config that has no meaning without all of these
             tried.append(_compared(models.run(left_out), left_out, summed(left_out), most))

@@ -10,27 +10,29 @@ ARCSEC = math.degrees(1.0) * 3600.0
 """Arcseconds of a radian."""
 
 
-class EffectWorth(SummaryPart):
-    """What leaving out one effect does, over the span.
+class MeasuredModel(SummaryPart):
+    """A model that was run.
 
     Attributes:
-        rms_arcsec, largest_arcsec: angle between the attitudes with it and without; of averages between the
+        rms_arcsec, largest_arcsec: angle between its attitudes and the full model's; of averages between the
             axes.
-        cpu_seconds, steps: of the run without it.
-        operations: of the equations without it.
-        required: whether the least model has it.
-        run: folder of the run without it.
+        operations: of its equations. cpu_seconds, steps: of its run, in the folder ``run``.
     """
+
+    rms_arcsec: float
+    largest_arcsec: float
+    operations: int
+    steps: int
+    cpu_seconds: float
+    run: str
+
+
+class EffectWorth(MeasuredModel):
+    """What leaving out one effect does, over the span; ``required``: whether the least model has it."""
 
     code: str
     words: str
-    rms_arcsec: float
-    largest_arcsec: float
-    cpu_seconds: float
-    steps: int
-    operations: int
     required: bool
-    run: str
 
 
 class UnassessedEffect(SummaryPart):
@@ -47,27 +49,20 @@ class AveragedLevel(SummaryPart):
     largest_arcsec: float
 
 
-class ComparedModel(SummaryPart):
+class ComparedModel(MeasuredModel):
     """A model that was run, against the full one.
 
     Attributes:
         left_out: codes of the effects that it doesn't have; of those with parts the whole alone.
         expected_arcsec: largest angle of the sum of what its effects do one by one.
-        operations: of its equations.
         cost: steps times operations.
         within: whether its largest angle is within the error.
     """
 
     left_out: list[str]
-    rms_arcsec: float
-    largest_arcsec: float
     expected_arcsec: float
-    operations: int
-    steps: int
     cost: int
-    cpu_seconds: float
     within: bool
-    run: str
 
 
 class PhysicsPlan(SummaryPart):
