@@ -26,7 +26,6 @@ _LEAST_DAMPING = 1e-12
 _CALM = 3  # steps in a row that didn't fail, after which damping falls fast
 _SHORTER = 0.1  # of a step: the next one may have the same derivatives
 _LAST = 0.1  # sigmas: a step as short as this most likely ends a fit, where derivatives are needed anyway
-_NEAR = 0.02  # sigmas: derivatives from no further away are those of a place, to far less than sigmas show
 _LATELY = 10  # evaluations
 _ROUNDED = 1e-11  # relative change of a sum of squares that rounding makes
 
@@ -169,7 +168,7 @@ def iterate(
 
     Derivatives cost several times as much as a motion: they are worked out anew where the next step hasn't
     become much shorter, and with the motion itself where it will most likely be the last one. Where it ends
-    they are from at most ``_NEAR`` sigmas away.
+    they are those of its values.
 
     Args:
         begin: (estimated,) first values.
@@ -181,58 +180,50 @@ def iterate(
     values, linear, fresh = np.array(begin, dtype=float), linearised(begin), True
     if linear is None:
         return None
-    damping, iterations, growth, calm, settled = _FIRST_DAMPING, 1, 2.0, _CALM, False
+    solution, iterations, settled = Solution(linear), 1, False
+    damping, growth, calm = _FIRST_DAMPING, 2.0, _CALM
     barred = -_LATELY  # the latest evaluation without a motion
-    apart = 0.0  # sigmas from where the derivatives are from
-    solution = Solution(linear)
     told(iterations, linear.cost, solution.step_sigmas)
     while iterations < most and damping < _LARGEST_DAMPING:
-        settled = settled or solution.step_sigmas <= WITHIN
-        if settled and apart <= _NEAR:
+        before, trial = solution.step_sigmas, None
+        settled = settled or before <= WITHIN
+        if settled and fresh:
             break
-        last = not settled and not fresh and solution.step_sigmas <= _LAST
-        if settled:
-            trial, step = linearised(values), np.zeros_like(values)
-        else:
+        last = not settled and not fresh and before <= _LAST
+        if not settled:
             step = solution.step(damping)
-            still = bool((values + step == values).all())
-            trial = None if still else linearised(values + step, fresh=last)
-            barred = iterations if trial is None and not still else barred
+            trial = linearised(values + step, fresh=last)
+            barred = iterations if trial is None else barred
         iterations += 1
-        most_cost = linear.cost * (1 + _ROUNDED) if last else linear.cost
-        if settled or trial is None or trial.cost >= most_cost:
-            if not fresh:  # perhaps it is the old derivatives
-                again = trial if settled else linearised(values)
-                assert again is not None  # the motion was computed there
-                linear, fresh, settled, apart = again, True, False, 0.0
-                solution = Solution(linear)
+        rounded = trial is not None and trial.cost <= linear.cost * (1 + _ROUNDED)
+        if trial is not None and (trial.cost < linear.cost or (last and rounded)):
+            gained = (linear.cost - trial.cost) / max(linear.foreseen(step), 1e-300)
+            calm += 1
+            least = 1e-2 if calm > _CALM else 1 / 3  # just after a step that failed, not back to where it did
+            damping = 0.0 if damping < _LEAST_DAMPING else damping * max(least, 1 - (2 * gained - 1) ** 3)
+            settled, growth = trial.cost >= linear.cost, 2.0  # rounding is all that changes any more
+            values, linear, fresh = values + step, trial, last
+            solution = Solution(linear)
+            if fresh or solution.step_sigmas <= _SHORTER * before:
                 told(iterations, linear.cost, solution.step_sigmas)
                 continue
-            if trial is not None and trial.cost <= linear.cost * (1 + _ROUNDED):
-                settled = _rounding_is_left(linear, solution)  # otherwise damping alone keeps it here
-                if settled:
-                    continue
-            damping, growth, calm = max(damping, _AFTER_FAILURE) * growth, 2 * growth, 0
+        elif fresh:
+            settled = rounded and _rounding_is_left(linear, solution)  # otherwise damping keeps it here
+            if not settled:
+                damping, growth, calm = max(damping, _AFTER_FAILURE) * growth, 2 * growth, 0
             continue
-        gained = (linear.cost - trial.cost) / max(linear.foreseen(step), 1e-300)
-        before = solution.step_sigmas
-        settled = trial.cost >= linear.cost  # rounding is all that changes any more
-        values, linear, fresh = values + step, trial, last
-        apart = 0.0 if fresh else apart + before
-        calm += 1
-        least = 1e-2 if calm > _CALM else 1 / 3  # just after a step that failed, not back to where it did
-        damping = 0.0 if damping < _LEAST_DAMPING else damping * max(least, 1 - (2 * gained - 1) ** 3)
-        growth = 2.0
+        linear, fresh, settled = _there(linearised, values), True, False
         solution = Solution(linear)
-        if not fresh and _SHORTER * before < solution.step_sigmas:
-            again = linearised(values)
-            assert again is not None
-            linear, fresh, apart = again, True, 0.0
-            solution = Solution(linear)
         told(iterations, linear.cost, solution.step_sigmas)
-    if apart > _NEAR:
-        again = linearised(values)
-        assert again is not None
-        linear, solution = again, Solution(again)
+    if not fresh:
+        linear = _there(linearised, values)
+        solution = Solution(linear)
     converged = settled or solution.step_sigmas <= WITHIN
     return Ended(values, linear, solution, converged, iterations, iterations - barred <= _LATELY)
+
+
+def _there(linearised: Linearised, values: np.ndarray) -> Linear:
+    """The fit where the motion was computed before, with derivatives of these values."""
+    found = linearised(values)
+    assert found is not None
+    return found

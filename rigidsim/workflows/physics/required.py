@@ -164,16 +164,9 @@ def _tried(models: Models, alone: Mapping[str, ModelRun], most: float) -> list[C
 def least_config(experiment: Experiment, codes: Sequence[str]) -> Experiment:
     """The experiment without some effects, and without asking to record what isn't there then."""
     made = without(experiment, codes)
-    names = made.config.output.record
-    try:
-        prepare(made)
-    except ConfigError:
-        if names is None:
-            raise
-        kept = [name for name in names if _recordable(made, name)]
-        made = made.having([f"output.record={kept}".replace("'", '"')])
-        prepare(made)
-    return made
+    names = made.config.output.record or []
+    kept = [name for name in names if _recordable(made, name)]
+    return made if kept == names else made.having([f"output.record={kept}".replace("'", '"')])
 
 
 def _recordable(experiment: Experiment, name: str) -> bool:
