@@ -106,6 +106,7 @@ def test_an_event_on_a_narrow_function_of_time(runs: Path) -> None:
     [
         ("7668.6", "", {"work"}),  # a circle at 400 km
         ("7668.6", 'record = ["quaternion"]', set()),
+        ("7668.6", 'record = ["quaternion"]\n[integrator]\nformulation = "euler_angles"', {"work"}),
         ("8500", 'record = ["quaternion"]', {"pace"}),  # it rises by 4,600 km
         ("7668.6", 'record = ["quaternion"]\n[limits]\nmax_drift = 1e-3', {"work"}),
         ("0", 'record = ["quaternion"]', {"pace"}),  # it falls

@@ -58,10 +58,13 @@ BALANCE = ("work", "energy_balance")
 
 
 def carries_work(m: Mechanics) -> bool:
-    """Whether the loads' power is integrated: if one asks for what takes it, or guards all drifts."""
-    config = m.scene.config
+    """Whether the loads' power is integrated: if one asks for what takes it, guards all drifts, or if the
+    attitude has no norm that is monitored in its place.
+    """
+    config, attitude = m.scene.config, m.attitude
     asked = config.output.record is None or not set(BALANCE).isdisjoint(config.output.record)
-    return (asked or config.limits.max_drift is not None) and has_balance(m)
+    alone = attitude is None or attitude.defect is None
+    return (asked or alone or config.limits.max_drift is not None) and has_balance(m)
 
 
 def has_balance(m: Mechanics) -> bool:

@@ -1,12 +1,17 @@
-"""Moments at which surfaces that depend on time alone are crossed, in two numbers.
+"""Moments at which surfaces that depend on time alone are crossed, in two numbers, and the sides between.
 
-The engine finds them to one number's precision, which would make a pulse of 1 ms late in a run longer or
-shorter by a part in a thousand million. Here they are worked out from the expressions as written.
+The engine finds zeros to one number's precision, which would make a pulse of 1 ms late in a run longer or
+shorter by a part in a thousand million. Arguments that are lines in time on each side of what is piecewise in
+them have zeros that are known as written: steps end there, and the sides between are known from the start.
+Other functions of time may be too narrow for a step's polynomials, as 1 - ((t - 5000)/1e-9)^2 is; steps also
+end where the lines within them vanish, and where they do themselves near there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -17,162 +22,127 @@ from rigidsim.scene.expressions.piecewise import on_sides
 from rigidsim.scene.expressions.tree import (
     Expression,
     ExpressionError,
+    LineInTime,
     as_line,
     evaluate,
     lines_in,
     names_used,
+    operations,
 )
 from rigidsim.solve.precision import Precision, Scalar
 
-_WIDER, _MOST_WIDER = 2.0**2, 14  # from one rounding of a time on, around which its zero is looked for
-_MOST_PARTS = 500  # of an interval that shrinks to the arithmetic's precision
+_MOST_WITHIN = 6  # signs in the argument of another
+_NEAR = 8.0  # value of a line up to which a function of it may change within less than a step
 
 
 class Moments:
-    """The moments of one surface, ``of_time`` if its argument depends on time alone; ``at_known_time`` if
-    that is a line in time, whose values have hardly any rounding.
+    """Of a system's surfaces.
+
+    Attributes:
+        timed: numbers of the surfaces whose sides are known at all times.
+        knots: times (two numbers, ascending) at which steps end.
     """
 
-    def __init__(self, system: System, precision: Precision, place: int) -> None:
-        expression = system.plan.surfaces.found[place].expression
-        self._system, self._precision, self._expression, self._place = system, precision, expression, place
-        self._context, self._epsilon = system.scene.context, float(precision.epsilon)
-        self.of_time = of_time(system, place)
-        known = system.clocked and self.of_time
-        self.at_known_time = known and as_line(expression, self._context) is not None
-        lines = lines_in(expression, self._context) if known and not self.at_known_time else []
-        self._middles = sorted(system.scaling.internal(line.zero, self._context) for line in lines)
-        self._from = [precision.number(middle) for middle in self._middles]
-        self._zeros: dict[tuple[int, ...], tuple[Expression, Any]] = {}
-
-    @property
-    def may_hide(self) -> bool:
-        """Whether ``hidden`` may find anything."""
-        return bool(self._from)
-
-    def rounded_from(self, time: Scalar) -> float:
-        """The span of time (internal units) to which the argument's rounding is relative: from the farthest
-        moment at which a line within it vanishes, or from the clock's zero if the equations see one number.
-        """
-        if not self.at_known_time and not self._from:
-            return abs(float(time))
-        rounding = self._epsilon * abs(float(time))
-        if self.at_known_time:
-            return rounding
-        return max(abs(float(time - moment)) for moment in self._from) + rounding
-
-    def all_rounded_from(self, times: np.ndarray) -> np.ndarray:
-        """The same of times (n,), float64."""
-        if not self.at_known_time and not self._from:
-            return np.abs(times.astype(np.float64))
-        return np.array([self.rounded_from(time) for time in times])
-
-    def near(self, time: Scalar, modes: Sequence[int]) -> tuple[Scalar, Scalar] | None:
-        """The moment in two numbers next to one in one; None if the state matters or none is there."""
-        found = self._exactly_near(time, modes)
-        return None if found is None else in_two_numbers(found, self._precision.number, self._context)
-
-    def left_out(self, time: tuple[Scalar, Scalar], modes: Sequence[int]) -> float:
-        """How far two numbers are from the moment next to them; 0 if it isn't known."""
-        found = self._exactly_near(time[0], modes)
-        if found is None:
-            return 0.0
-        return abs(float(found - exactly(time[0], self._context) - exactly(time[1], self._context)))
-
-    def hidden(self, begin: Scalar, end: Scalar, modes: Sequence[int]) -> Scalar | None:
-        """The middle of something between two times, where the argument isn't on the motion's side: it may be
-        too narrow for a step's polynomials, as 1 - ((t - 5000)/1e-9)^2 is.
-        """
-        for number, middle in zip(self._from, self._middles, strict=True):
-            if not begin < number < end:
+    def __init__(self, system: System, precision: Precision) -> None:
+        self._system, self._context, found = system, system.scene.context, system.plan.surfaces.found
+        self._epsilon = float(precision.epsilon)
+        lines: dict[int, list[Any]] = {}
+        zeros: set[Any] = set()
+        self.timed = []
+        for j, surface in enumerate(found):
+            if names_used(surface.expression) != {"t"}:
                 continue
-            expression, zero = self._on(modes)
-            if zero is not None:  # a straight line hides nothing
-                return None
-            try:
-                value = self._value(expression, middle)
-            except ExpressionError:
-                continue
-            if value * modes[self._place] < 0:
-                return number
-        return None
+            known = self._zeros(surface.expression)
+            if known is not None:
+                self.timed.append(j)
+            elif system.clocked:
+                within = lines_in(surface.expression, self._context)
+                known = lines[j] = [line.zero for line in within]
+                zeros.update(x for line in within for x in self._beside(surface.expression, line))
+            zeros.update(known or ())
+        scaling, one = system.scaling, self._context.one
+        self._exact = sorted(scaling.internal(zero, self._context) for zero in zeros)
+        self.knots = [in_two_numbers(zero, precision.number, self._context) for zero in self._exact]
+        middles = [a + (b - a) / 2 for a, b in pairwise(self._exact)]
+        if zeros:
+            middles = [self._exact[0] - one, *middles, self._exact[-1] + one]
+        unit = self._context.ldexp(scaling.direction * one, scaling.time)
+        self._sides = [
+            [self._side(found[j].expression, middle * unit) for j in self.timed]
+            for middle in middles or [one]
+        ]
+        self._lines = {
+            j: np.array([float(scaling.internal(zero, self._context)) for zero in known])
+            for j, known in lines.items()
+        }
 
-    def _exactly_near(self, time: Scalar, modes: Sequence[int]) -> Any | None:
-        if not self.of_time:
+    def sides(self, time: tuple[Scalar, Scalar]) -> dict[int, int]:
+        """Sides of the surfaces that are known, of steps that begin at a time."""
+        return dict(zip(self.timed, self._sides[bisect_right(self.knots, time)], strict=True))
+
+    def following(self, time: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar] | None:
+        """The next knot after a time; None after the last one."""
+        place = bisect_right(self.knots, time)
+        return self.knots[place] if place < len(self.knots) else None
+
+    def passed(self, knot: tuple[Scalar, Scalar]) -> Iterator[tuple[float, dict[int, int], dict[int, int]]]:
+        """The moments that two numbers make one: how far they are from each, and the sides on both sides."""
+        for place in range(bisect_left(self.knots, knot), bisect_right(self.knots, knot)):
+            exact, context = self._exact[place], self._context
+            off = abs(float(exact - exactly(knot[0], context) - exactly(knot[1], context)))
+            before, after = self._sides[place : place + 2]
+            yield off, dict(zip(self.timed, before, strict=True)), dict(zip(self.timed, after, strict=True))
+
+    def spans(self, times: np.ndarray) -> np.ndarray:
+        """Spans of time (surfaces, n) to which the rounding of arguments is relative: of those in which the
+        time takes two numbers from the nearest zero of a line, of others from the clock's zero.
+        """
+        plain = np.abs(times.astype(np.float64))
+        found = np.tile(plain, (len(self._system.surfaces), 1))
+        for j, zeros in self._lines.items():
+            if len(zeros):
+                apart = np.abs(times.astype(np.float64)[:, None] - zeros).min(axis=1)
+                found[j] = apart + self._epsilon * plain
+        return found
+
+    def _zeros(self, expression: Expression) -> list[Any] | None:
+        """Zeros (s, mpf) on any sides of an argument that is a line or constant on each, as are all arguments
+        of signs within it; None for others.
+        """
+        surfaces, context = self._system.plan.surfaces, self._context
+        signs = [node.operands[0] for node in operations(expression) if node.operator == "sign"]
+        within = sorted({surfaces.places[u][0] for u in signs})
+        if len(within) > _MOST_WITHIN or any(self._zeros(u) is None for u in signs):
             return None
-        context = self._context
-        expression, zero = self._on(modes)
-        if zero is not None:
-            return zero
-        rounding = context.mpf(float(self._precision.epsilon)) * max(abs(float(time)), 1.0)
-        function: Callable[[Any], Any] = lambda t: self._value(expression, t)  # noqa: E731
-        about = exactly(time, context)
-        return _zero(function, about, rounding, self._middles, modes[self._place], context)
+        found, sides = [], [1] * len(surfaces.found)
+        for chosen in product((1, -1), repeat=len(within)):
+            for j, side in zip(within, chosen, strict=True):
+                sides[j] = side
+            here = on_sides(expression, surfaces.places, sides)
+            line = as_line(here, context)
+            if line is None and names_used(here):
+                return None
+            found += [] if line is None else [line.zero]
+        return found
 
-    def _value(self, expression: Expression, time: Any) -> Any:
-        scaling = self._system.scaling
-        unit = self._context.ldexp(scaling.direction * self._context.one, scaling.time)
-        return evaluate(expression, {"t": time * unit}, self._context)
+    def _beside(self, expression: Expression, line: LineInTime) -> Iterator[Any]:
+        """Zeros (s, mpf) of a function of time where a line within it is small."""
 
-    def _on(self, modes: Sequence[int]) -> tuple[Expression, Any]:
-        """The argument on these sides of the surfaces within it, and its zero (mpf) if it is a line."""
-        sides = tuple(modes)
-        if sides not in self._zeros:
-            found = on_sides(self._expression, self._system.plan.surfaces.places, sides)
-            line = as_line(found, self._context) if self._system.clocked else None
-            zero = None if line is None else self._system.scaling.internal(line.zero, self._context)
-            self._zeros[sides] = found, zero
-        return self._zeros[sides]
+        def value(time: Any) -> Any:
+            try:
+                return evaluate(expression, {"t": time}, self._context)
+            except ExpressionError:  # undefined there
+                return self._context.one
 
+        times = [(k - line.offset) / line.slope for k in np.arange(-_NEAR, _NEAR, 1 / 8).tolist()]
+        for a, b in pairwise(times):
+            if value(a) * value(b) < 0:
+                yield self._context.findroot(value, (a, b), solver="illinois", verify=False)
 
-def of_time(system: System, place: int) -> bool:
-    """Whether the argument of a surface depends on time alone."""
-    return names_used(system.plan.surfaces.found[place].expression) == {"t"}
-
-
-def moments_of(system: System, precision: Precision) -> list[Moments]:
-    """The moments of each surface of a system."""
-    return [Moments(system, precision, place) for place in range(len(system.surfaces))]
+    def _side(self, expression: Expression, time: Any) -> int:
+        return -1 if evaluate(expression, {"t": time}, self._context) < 0 else 1
 
 
 def between(begin: tuple[Scalar, Scalar], end: tuple[Scalar, Scalar]) -> Scalar:
     """From one time in two numbers to another."""
     return (end[0] - begin[0]) - begin[1] + end[1]
-
-
-def _zero(
-    function: Callable[[Any], Any], about: Any, width: Any, middles: Sequence[Any], side: int, context: Any
-) -> Any | None:
-    """A zero of a function near a number, to the precision of the arithmetic; None if there is none.
-
-    Regula falsi with halved ordinates (Dowell & Jarratt 1971, BIT 11, 168). Zeros are looked for between the
-    middles of narrow things, too; of two as near it is that before which the function has the sign ``side``.
-    """
-    try:
-        for _ in range(_MOST_WIDER):
-            a, b = about - width, about + width
-            points = [a, *(x for x in middles if a < x < b), b]
-            values = [function(x) for x in points]
-            changes = [n for n in range(1, len(points)) if values[n - 1] * values[n] <= 0]
-            if changes:
-                n = next((n for n in changes if side * values[n - 1] >= 0), changes[0])
-                (a, b), (u, v) = points[n - 1 : n + 1], values[n - 1 : n + 1]
-                break
-            width *= _WIDER
-        else:
-            return None
-        for _ in range(_MOST_PARTS):
-            if u == v or abs(b - a) <= context.ldexp(abs(b), 4 - context.prec):
-                break
-            c = b - v * (b - a) / (v - u)
-            w = function(c)
-            if w == 0:
-                return c
-            if w * v < 0:
-                a, u = b, v
-            else:
-                u = u / 2
-            b, v = c, w
-    except ExpressionError:  # undefined beside its zero
-        return None
-    return b

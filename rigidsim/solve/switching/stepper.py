@@ -12,11 +12,10 @@ The engine would find the zero at which a step begins again and again, in place 
 an argument is zero but for rounding, its event watches the sum with a parameter, a rounding on the side that
 the motion is on. Then no cooldown is needed, and a boundary holds all that later steps depend on.
 
-Surfaces that depend on time alone end no step by themselves: their roots are noted, and worked out from the
-expressions as written (``rigidsim.solve.switching.moments``). The turns of angles and the sign of the
-quaternion, where an expression depends on them, are parameters of the equations, continued from step to step;
-along surfaces the motion has equations of its own, compiled when they are first needed. Both take single
-steps.
+Surfaces that depend on time alone are crossed at moments known as written, where steps end
+(``rigidsim.solve.switching.moments``). The turns of angles and the sign of the quaternion, where an
+expression depends on them, are parameters of the equations, continued from step to step; along surfaces the
+motion has equations of its own, compiled when they are first needed. Both take single steps.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from __future__ import annotations
 import copy
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -37,9 +36,8 @@ from rigidsim.solve.events import BESIDE, EventLog, engine_events, of_order_one
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.requirements import SetAtKnots
 from rigidsim.solve.stepper import Mark, SamplesWithin, bound_of_sparse_series, may_be_sparse
-from rigidsim.solve.switching.moments import between, of_time
+from rigidsim.solve.switching.moments import Moments, between
 from rigidsim.solve.switching.sides import (
-    HELD,
     SLIDES,
     Continuation,
     Fields,
@@ -47,11 +45,13 @@ from rigidsim.solve.switching.sides import (
     SurfaceValues,
     crossings,
 )
-from rigidsim.solve.switching.sliding import MOST_AT_ONCE, Meeting, sliding
+from rigidsim.solve.switching.sliding import MOST_AT_ONCE, sliding
 from rigidsim.solve.switching.turned import MOST, Turned
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
-_ATTEMPTS = 32  # attempts at one step
+_ATTEMPTS = 32  # at one step that begins on a surface
+_MISTAKEN = 2.0**10  # roundings of an argument from which on the engine can't have found its zero
+_FAR_OFF = 2.0**100  # within the range of single precision
 _MOST_CALLS = 1000  # that take steps on to a given time
 _FIRST_AHEAD, _MOST_AHEAD = 16, 1024  # steps that are looked at together: some MB of series
 _MOST_SWITCHES = 256
@@ -63,9 +63,6 @@ _ROUNDINGS = 2.0**15  # in the square of an interval
 _MOST_LEFT_OUT = 8.0  # roundings of the state, by a moment in two numbers
 _NOT_RESOLVED = "choose a higher precision, or count time from an epoch shortly before"
 _WIDTH = 2.0**8  # roundings of a time between two findings of the same crossing
-
-Root = tuple[Any, int, int]
-"""Time, number of a surface, and the side to which it leads."""
 
 
 class _Passed(NamedTuple):
@@ -92,7 +89,7 @@ class _Passed(NamedTuple):
 class SwitchingStepper(TaylorStepper):
     """Stepper of a system with surfaces, or with angles whose turns matter; it begins where motion leads."""
 
-    version = 2
+    version = 3
     single_steps = True
 
     def __init__(
@@ -103,21 +100,23 @@ class SwitchingStepper(TaylorStepper):
         start: Scalar,
         log: EventLog | None = None,
     ) -> None:
-        self._roots: list[Root] = []  # noted within the latest step
         self._cut: tuple[int, int] | None = None  # surface on which the engine ended it, and the new side
         self._passed: list[_Passed] | None = None  # boundaries, while many steps are taken
         self._samples: SamplesWithin | None = None
         self._halted = self._fresh = False
+        self._knot: tuple[Scalar, Scalar] | None = None  # at which the steps taken together end
         self._offset: list[int] = []  # parameters that are added to events
         self._ahead = _FIRST_AHEAD
         self._functions_by_chart: dict[int, SurfaceFunctions] = {}
-        self._engines: dict[tuple[int, tuple[int, ...], tuple[int, ...]], TaylorEngine] = {}
+        self._engines: dict[tuple[int, tuple[int, ...]], TaylorEngine] = {}
         self._chart = 0
-        surfaces = system.plan.surfaces
-        self._modes = [1] * len(surfaces.found)
+        self._moments = Moments(system, precision)
+        self._modes = [1] * len(system.surfaces)
+        self._free = np.array([j not in self._moments.timed for j in range(len(self._modes))], dtype=bool)
         self._crossed, self._count, self._since = 0, 0, 0.0
         self._count_of_pars = system.parameters  # without what is added to events
         self._piece: np.ndarray | None = None  # parameters of the piece in which the latest step was
+        self._now = np.zeros(0)  # parameters that sides and equations read, all of them
         self._off, self._minus, self._plus = _scalars(precision, [0.0, -1.0, 1.0])
         super().__init__(system, precision, tolerance, start, log)
         # in the partner chart, where a run may begin, angles are plain already
@@ -134,20 +133,11 @@ class SwitchingStepper(TaylorStepper):
         return tuple(j for j, mode in enumerate(self._modes) if mode == SLIDES)
 
     @property
-    def _held(self) -> dict[int, tuple[int, int]]:
-        """For surfaces kept to at rest: the surface whose side each has (1) or the opposite (-1)."""
-        return {
-            j: (abs(mode) - HELD, 1 if mode > 0 else -1)
-            for j, mode in enumerate(self._modes)
-            if abs(mode) >= HELD
-        }
-
-    @property
     def _functions(self) -> SurfaceFunctions:
         if self._chart not in self._functions_by_chart:
             system = self._system_of(self._chart)
             self._functions_by_chart[self._chart] = interruptible(
-                lambda: SurfaceFunctions(system, self.precision)
+                lambda: SurfaceFunctions(system, self.precision, self._moments)
             )
         return self._functions_by_chart[self._chart]
 
@@ -193,8 +183,9 @@ class SwitchingStepper(TaylorStepper):
 
     def settle(self) -> None:
         """Must be called after the state was set from outside: takes the sides on which it lies."""
-        # the state lies beside surfaces that it kept to
-        self._modes = [mode if abs(mode) == 1 else 1 for mode in self._modes]
+        # the state lies beside surfaces that it slid along
+        self._modes = [mode or 1 for mode in self._modes]
+        self._take_known_sides()
         self._agree()
         self._enter()
 
@@ -202,40 +193,30 @@ class SwitchingStepper(TaylorStepper):
 
     def _enter(self) -> None:
         """Continue with the equations of this chart along the current surfaces."""
-        key = self._chart, self._along, tuple(self._modes[j] for j in self._held)
+        key = self._chart, self._along
         if key not in self._engines:
-            system, along, held = self._system_of(self._chart), self._along, self._held
-            interruptible(lambda: self._compiled(system, along, held))
+            interruptible(lambda: self._compiled(self._system_of(self._chart), self._along))
         entered = self._engines[key]
         if entered is not self._integrator:
             entered.dtime = self._integrator.dtime
             entered.state[:] = self._integrator.state
             self._integrator = entered
 
-    def _compiled(
-        self, system: System, along: tuple[int, ...] = (), held: Mapping[int, tuple[int, int]] | None = None
-    ) -> TaylorEngine:
-        held, kind = held or {}, self.precision.scalar
-        options = dict(self.precision.options)
-        equations = system.equations
+    def _compiled(self, system: System, along: tuple[int, ...] = ()) -> TaylorEngine:
+        options, equations = dict(self.precision.options), system.equations
         shifted = [u + hy.par[system.parameters + j] for j, u in enumerate(system.surfaces)]
-        ends, noted = [], []
-        for j, u in enumerate(of_order_one(system, shifted, system.surfaces)):
-            if j in along or j in held:
-                continue
-            if of_time(system, j):
-                noted.append(hy.nt_event(u, self._noting(j), fp_type=kind))
-            else:
-                ends.append(self._event(u, j))
+        arguments = enumerate(of_order_one(system, shifted, system.surfaces))
+        ends = [self._event(u, j) for j, u in arguments if self._free[j] and j not in along]
+        noted = []
         if along:
-            found = sliding(system, along, held)
+            found = sliding(system, along)
             equations = found.equations
             for j, side in zip(along, found.sides, strict=True):
                 ends.append(self._event(side - 1.0, j, 1, hy.event_direction.positive))
                 ends.append(self._event(side + 1.0, j, -1, hy.event_direction.negative))
         if self.has_events:
             offsets = system.parameters + len(system.surfaces)
-            noted += engine_events(system, self.precision, self.log, offsets=offsets)
+            noted = engine_events(system, self.precision, self.log, offsets=offsets)
         if self._tolerance is not None:
             options["tol"] = self._tolerance
         integrator = hy.taylor_adaptive(
@@ -247,7 +228,7 @@ class SwitchingStepper(TaylorStepper):
             compact_mode=self.precision.compact or system.wide or len(along) > 1,
             **options,
         )
-        self._engines[(self._chart, along, tuple(self._modes[j] for j in held))] = integrator
+        self._engines[self._chart, along] = integrator
         return integrator
 
     def _event(
@@ -265,12 +246,6 @@ class SwitchingStepper(TaylorStepper):
         return hy.t_event(
             u, callback=called, direction=way, cooldown=self._off, fp_type=self.precision.scalar
         )
-
-    def _noting(self, j: int) -> Callable[[TaylorEngine, Scalar, int], None]:
-        def called(_: TaylorEngine, time: Scalar, way: int) -> None:
-            self._roots.append((time, j, way))
-
-        return called
 
     # --- parameters -----------------------------------------------------------------------------------------
 
@@ -311,12 +286,12 @@ class SwitchingStepper(TaylorStepper):
         return self._pars(self._joined(self.state, self.time), over, self._low)
 
     def _look(self, state: np.ndarray, time: Scalar, low: Scalar | None = None) -> SurfaceValues:
-        """SurfaceValues at the surfaces in a state of the latest step, at a time in one number or two."""
+        """The surfaces in a state of the latest step, at a time in one number or two."""
         return self._functions.look(state, time, self._pars(self._joined(state, time), low=low))
 
     def _plain(self, state: np.ndarray, time: Scalar) -> tuple[list[float], list[float]]:
         """Angles within one turn, and the quaternion without its sign, that expressions read."""
-        return self._functions.values(state, time, self._pars(self._functions.unturned))[1:]
+        return self._functions.plain(state, time, self._pars(self._functions.unturned))
 
     def _joined(self, state: np.ndarray, time: Scalar) -> list[float]:
         """Turns and sign, continued from the latest step on to a state."""
@@ -327,7 +302,7 @@ class SwitchingStepper(TaylorStepper):
         if self._functions.unturned:
             self._turned = self._turned.followed(*self._plain(self.state, self.time))
 
-    def _set(self) -> None:
+    def _set(self, muted: Collection[int] = ()) -> None:
         """Set the parameters of the equations, and what is added to events, at this boundary.
 
         An event of the config that lies there, and was found on the way to it, watches the zero of its sum
@@ -336,21 +311,20 @@ class SwitchingStepper(TaylorStepper):
         engine, pars = self._integrator, self._parameters()
         look = self._functions.look(self.state, self.time, pars)
         # the change of the state in a unit of time shows its size
-        noises = self._functions.noises(look, [self.state, look.field])
-        moved = [0.0] * len(self._modes)
-        for j, (u, noise, mode) in enumerate(zip(look.u, noises, self._modes, strict=True)):
-            of_time = self._functions.moments[j].of_time
-            near = abs(float(u)) <= noise or (j + 1 == self._crossed and not of_time)
-            if near and abs(mode) < HELD:
-                moved[j] = mode * (
-                    noise if of_time else self._functions.beside(self.state, self.time, pars, j)
-                )
+        noises, moved = look.noises(self.state, look.field.T)[:, 0], [0.0] * len(self._modes)
+        for j, mode in enumerate(self._modes):
+            near = abs(look.u[j, 0]) <= noises[j] or j + 1 == self._crossed
+            if near and self._free[j]:
+                moved[j] = mode * self._functions.beside(self.state, self.time, pars, j)
+        for j in muted:
+            moved[j] = self._modes[j] * _FAR_OFF
         if self.has_events:
             moved += [
                 self._event_offset(*found) for found in self._functions.crossings(self.state, self.time, pars)
             ]
         everything = np.concatenate([pars, _scalars(self.precision, moved)])
-        engine.pars[:] = everything[: len(engine.pars)]  # along a surface the last ones have no meaning
+        engine.pars[:] = everything[: len(engine.pars)]  # those that nothing reads have no meaning
+        self._now = pars
         self._offset = [self.system.parameters + i for i, number in enumerate(moved) if number]
 
     def _event_offset(self, value: float, noise: float) -> float:
@@ -387,22 +361,24 @@ class SwitchingStepper(TaylorStepper):
     @property
     def _single(self) -> bool:
         """Whether steps have to be taken one by one here."""
-        if self._unsettled or self._functions.unturned or self.watcher is not None:
+        if self._unsettled or self._functions.unturned or self.watcher is not None or self._along:
             return True
-        return any(abs(mode) != 1 for mode in self._modes)
+        knot = self._moments.following(self._integrator.dtime)
+        return knot is not None and knot[0] <= self.time
 
     def _together(self, most: int, samples: SamplesWithin | None) -> bool:
         """Take several plain steps; returns whether the one that follows has to be taken by itself."""
         until = self._meet()
         self._set()
         self._quieten()
-        self._roots.clear()
         engine, begun, known = self._integrator, self.mark(), 0 if samples is None else len(samples.states)
         self._passed, self._samples, self._cut, self._halted = [], samples, None, False
         self._fresh = bool(self._crossed) or not self.steps
+        self._knot = self._moments.following(engine.dtime)
+        ends = [x for x in (until, None if self._knot is None else self._knot[0]) if x is not None]
         try:
             outcome, *_ = engine.propagate_until(
-                self._far if until is None else until,
+                min(ends, default=self._far),
                 max_steps=most,
                 max_delta_t=self._longest,
                 callback=self._pass,
@@ -443,16 +419,17 @@ class SwitchingStepper(TaylorStepper):
         """Go on beyond a surface on which a step ended among many; False if that has to be looked into."""
         if side != -self._modes[j] or not self._counts(float(engine.time)):
             return False
-        self._modes[j], first, pars = side, self._count_of_pars, engine.pars
-        pars[j] = self._plus if side > 0 else self._minus
-        beside = self._functions.beside(engine.state, engine.time, pars[:first], j)
-        pars[first + j] = self.precision.of_double(side * beside)
+        self._modes[j], first = side, self._count_of_pars
+        engine.pars[j] = self._now[j] = self._plus if side > 0 else self._minus
+        beside = self._functions.beside(engine.state, engine.time, self._now, j)
+        engine.pars[first + j] = self.precision.of_double(side * beside)
         self.log.quiet_until = engine.time + self._width(engine.time)
         return True
 
     def _pass(self, engine: TaylorEngine) -> bool:
         """Note a boundary among many."""
-        self._halted = self._halted or bool(self._roots)
+        knot = self._knot
+        self._halted = self._halted or (knot is not None and (engine.dtime >= knot or engine.time >= knot[0]))
         if self._halted:
             return False
         first, crossed = self._count_of_pars, 0 if self._cut is None else self._cut[0] + 1
@@ -462,7 +439,9 @@ class SwitchingStepper(TaylorStepper):
                 engine.pars[place] = self._off
         time = engine.dtime
         if self._functions.clocked and self.system.pieces is None:
-            engine.pars[first - 1] = time[1]
+            self._now[-1] = time[1]
+            if len(engine.pars) >= first:
+                engine.pars[first - 1] = time[1]
         samples = self._samples
         going = samples is None or samples(engine)
         assert self._passed is not None
@@ -470,7 +449,7 @@ class SwitchingStepper(TaylorStepper):
             _Passed(
                 time,
                 np.array(engine.state),
-                np.array(engine.pars[:first]),
+                np.array(self._now),
                 crossed,
                 (self._count, self._since),
                 len(self.log.found),
@@ -500,51 +479,39 @@ class SwitchingStepper(TaylorStepper):
         bad, near = np.zeros((2, len(passed)), dtype=bool)
         rows = np.flatnonzero((crossed >= 0) | self._functions.asks(states[1:], times, pars, sides))
         if len(rows):
-            there = states[:-1][rows], states[1:][rows], times[rows], pars[rows]
-            bad[rows], near[rows] = self._wrong_or_near(*there, sides[rows].T, crossed[rows])
+            before, here = states[:-1][rows], states[1:][rows]
+            looks = self._functions.looks(here, times[rows], pars[rows])
+            others = self._free[:, None] & (np.arange(sides.shape[1])[:, None] != crossed[rows])
+            wrong = sides[rows].T * looks.u < -looks.noises(here)
+            close = np.abs(looks.u) <= looks.noises(before, here, looks.field.T)
+            bad[rows], near[rows] = (others & wrong).any(axis=0), (others & close).any(axis=0)
         rows = np.flatnonzero(crossed >= 0)
         if len(rows):
             here = states[1:][rows], times[rows], pars[rows]
-            bad[rows] |= near[rows] | ~self._crossing(*here, crossed[rows])
+            bad[rows] |= near[rows] | ~self._crossing(states[:-1][rows], *here, crossed[rows])
         series = [(row, one.series) for row, one in enumerate(passed) if one.series is not None]
         maybe = may_be_sparse(np.array([found for _, found in series])) if series else np.zeros(0)
         for k in np.flatnonzero(maybe):
             row, found = series[k]
             bad[row] |= bound_of_sparse_series(found) < passed[row].size
-        if self._functions.hides:
-            begins = [begun.time[0], *times[:-1]]
-            for row, (begin, end) in enumerate(zip(begins, times, strict=True)):
-                bad[row] |= bool(self._hidden(begin, end, [int(side) for side in sides[row]]))
         first = int(np.argmax(bad)) if bad.any() else len(passed)
         again = int(np.argmax(near)) + 1 if near.any() else len(passed)
         return min(first, again), first < again and first < len(passed)
 
-    def _wrong_or_near(
-        self,
-        before: np.ndarray,
-        states: np.ndarray,
-        times: np.ndarray,
-        pars: np.ndarray,
-        sides: np.ndarray,
-        crossed: np.ndarray,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """At which of many boundaries a surface other than the one crossed is on the wrong side, or near."""
-        looks = self._functions.looks(states, times, pars)
-        others = np.arange(len(looks.u))[:, None] != crossed
-        wrong = sides * looks.u < -looks.noises(states)
-        near = np.abs(looks.u) <= looks.widest_noises(before, states)
-        return (wrong & others).any(axis=0), (near & others).any(axis=0)
-
     def _crossing(
-        self, states: np.ndarray, times: np.ndarray, pars: np.ndarray, crossed: np.ndarray
+        self, before: np.ndarray, states: np.ndarray, times: np.ndarray, pars: np.ndarray, crossed: np.ndarray
     ) -> np.ndarray:
         """At which of many boundaries the fields of both sides lead across the surface, and no event is."""
         rows = np.arange(len(crossed))
         side, flipped = np.where(pars[rows, crossed] > 0, 1.0, -1.0), pars.copy()
         flipped[rows, crossed] = -flipped[rows, crossed]
         looks = [self._functions.looks(states, times, given) for given in (pars, flipped)]
-        (here, noise), (there, other) = (look.rates(crossed, rows) for look in looks)
-        found = np.minimum(side * here, side * there) > np.maximum(noise, other)
+        least = np.min([side * look.rates[crossed, rows] for look in looks], axis=0)
+        here = looks[0]
+        there = np.abs(here.u) <= _MISTAKEN * here.noises(before, states, here.field.T)
+        found = there[crossed, rows] & (
+            least > np.max([look.rate_noises[crossed, rows] for look in looks], axis=0)
+        )
         return found & ~self._functions.crosses_too(states, times, pars) if self.has_events else found
 
     # --- one step -------------------------------------------------------------------------------------------
@@ -580,12 +547,14 @@ class SwitchingStepper(TaylorStepper):
         until = self._meet()
         self._watched()
         self._quieten()
-        log, events, longest = self.log, len(self.log.found), self._longest
-        for attempt in range(_ATTEMPTS + self.precision.bits):
+        events, longest, muted = len(self.log.found), self._longest, set[int]()
+        for attempt in range(self.precision.bits + _ATTEMPTS):
             engine = self._integrator
-            self._set()
+            self._set(muted)
             time, before = engine.dtime, np.array(engine.state)
-            finite = self._natural(until, longest)
+            knot = self._moments.following(time)
+            left = longest if knot is None else between(time, knot)
+            finite = self._natural(until, min(longest, left))
             bound = bound_of_sparse_series(engine.tc) if self._crossed or not self.steps else np.inf
             bound = min(bound, self._bound_of_turn(before, time[0]))
             if bound < abs(float(engine.last_h)):
@@ -594,31 +563,23 @@ class SwitchingStepper(TaylorStepper):
             if not finite:
                 return False
             size = engine.last_h
-            root = self._first_root(time, before)
-            if root is None and (missed := self._missed(before)) is not None:
-                if attempt < self.precision.bits:  # the engine finds it in a shorter step
-                    self._return(time, before, events)
-                    longest = size / 2
-                    continue
-                root = time[0], missed, -self._modes[missed]
-            if root is None:
+            arrived = self._cut is None and knot is not None and size >= left
+            if arrived:
+                engine.dtime = knot
+            missed, mistaken = self._missed(before), self._mistaken(before)
+            if missed is None and mistaken is None:
                 break
-            log.drop_after(events, root[0] + self._width(root[0]))
-            moment, known = self._moment(root)
-            left = between(time, moment)
-            if left > 0:
-                self._again(time, before, left, moment if known else None)
-                size, self._cut = left, root[1:]
-                break
-            # the step begins on the surface and leaves its side at once
             self._return(time, before, events)
-            if not self._arrive(*root[1:], [before], bool(self._crossed)):
+            if mistaken is not None:
+                muted.add(mistaken)
+            elif attempt < self.precision.bits:  # the engine finds its zero in a shorter step
+                longest = size / 2
+            elif not self._arrive(missed, -self._modes[missed], before):  # it leaves its side at once
                 return False
         else:
-            assert root is not None
-            return self._fail(root[1], "it turns back to it again and again")
-        cut, again = self._cut, bool(self._crossed)
-        if cut is not None and self.has_events:
+            return self._fail(missed or 0, "it turns back to it again and again")
+        cut = self._cut
+        if (cut is not None or arrived) and self.has_events:
             self._note_events(before, time[0], events)
         self._dense = engine
         self.smallest = self.largest = abs(float(size))
@@ -627,7 +588,9 @@ class SwitchingStepper(TaylorStepper):
         self.ended = self.watcher is not None and not self.watcher(engine)
         self._follow()
         self._crossed = 0
-        if cut is not None and not self._arrive(*cut, [before, np.array(self.state)], again):
+        if cut is not None and not self._arrive(*cut, before):
+            return False
+        if arrived and not self._pass_knot(knot, before):
             return False
         if self._along:
             self._keep_to_surfaces()
@@ -649,7 +612,6 @@ class SwitchingStepper(TaylorStepper):
     def _natural(self, until: Scalar | None, longest: Scalar) -> bool:
         """Take a natural step, which may end on a surface, from where the parameters are set."""
         engine = self._integrator
-        self._roots.clear()
         self._cut = None
         if until is None:
             outcome, _ = engine.step(longest, write_tc=True)
@@ -668,7 +630,7 @@ class SwitchingStepper(TaylorStepper):
             return math.inf
         pars = self._pars(self._functions.unturned)  # the engine has fewer where it slides
         after = np.array(self.state), self.time
-        rates = [self._functions.rate(*there, pars) for there in ((before, time), after)]
+        rates = [self._functions.spin(*there, pars) for there in ((before, time), after)]
         return MOST / max(sum(rates) / 2, 1e-300)
 
     def _width(self, time: Scalar) -> Scalar:
@@ -680,109 +642,49 @@ class SwitchingStepper(TaylorStepper):
         time = self.time
         self.log.quiet_until = time + self._width(time) if self._crossed else None
 
-    # --- roots that the engine doesn't stop at -----------------------------------------------------------
-
-    def _moment(self, root: Root) -> tuple[tuple[Scalar, Scalar], bool]:
-        """Time of a root in two numbers, and whether it is known from the surface's expression."""
-        known = self._functions.moments[root[1]].near(root[0], self._modes)
-        return known or (root[0], root[0] * 0), known is not None
-
-    def _first_root(self, begun: tuple[Scalar, Scalar], before: np.ndarray) -> Root | None:
-        """The first root where the step just taken leaves its side, from where it begun; None if none is."""
-        engine = self._integrator
-        end, after = engine.time, np.array(engine.state)
-        states = [before, after]
-        hidden = self._hidden(begun[0], end, self._modes)
-        # known moments may differ by less than one number resolves
-        roots = sorted([*self._roots, *hidden], key=lambda root: self._moment(root)[0])
-        for n, (time, j, side) in enumerate(roots):
-            if self._modes[j] == SLIDES or roots[n] in hidden:
-                return roots[n]
-            if side != -self._modes[j]:
-                continue
-            following = next((t for t, i, _ in roots[n + 1 :] if i == j), end)
-            middle = time + (following - time) / 2
-            look = self._look(engine.update_d_output(middle), middle)
-            if float(look.u[j]) * side > self._functions.noise(look, j, states):
-                return roots[n]
-        return None
-
     def _missed(self, before: np.ndarray) -> int | None:
         """A surface on whose wrong side the step just taken ended, although the engine found no zero."""
         look = self._look(self.state, self.time, self._low)
-        noises = self._functions.noises(look, [before, np.array(self.state)])
-        for j, mode in enumerate(self._modes):
-            wrong = abs(mode) < HELD and -mode * float(look.u[j]) > noises[j]
-            if wrong and (self._cut is None or self._cut[0] != j):
-                return j
-        return None
+        wrong = -np.array(self._modes) * look.u[:, 0] > look.noises(before, self.state)[:, 0]
+        here = -1 if self._cut is None else self._cut[0]
+        return next((j for j in np.flatnonzero(wrong & self._free).tolist() if j != here), None)
 
-    def _hidden(self, begin: Scalar, end: Scalar, modes: Sequence[int]) -> list[Root]:
-        """Roots within a step that its polynomials may have missed."""
-        middles = [moments.hidden(begin, end, modes) for moments in self._functions.moments]
-        return [(middle, j, -modes[j]) for j, middle in enumerate(middles) if middle is not None]
-
-    def _again(
-        self,
-        time: tuple[Scalar, Scalar],
-        before: np.ndarray,
-        size: Scalar,
-        moment: tuple[Scalar, Scalar] | None,
-    ) -> None:
-        """Repeat the step just taken up to a root, or to its known moment."""
-        engine, muted = self._integrator, self.log.muted
-        self.log.muted = True
-        try:
-            engine.dtime = time
-            engine.state[:] = before
-            engine.step(size, write_tc=True)
-            if moment is not None:
-                engine.dtime = moment
-        finally:
-            self.log.muted = muted
+    def _mistaken(self, before: np.ndarray) -> int | None:
+        """A surface on which the engine ended the step just taken, although it isn't there: as for a function
+        far narrower than the step.
+        """
+        if self._cut is None or self._modes[j := self._cut[0]] == SLIDES:
+            return None
+        look = self._look(self.state, self.time, self._low)
+        noise = look.noises(before, self.state, look.field.T)[j, 0]
+        return j if abs(look.u[j, 0]) > _MISTAKEN * noise else None
 
     # --- surfaces -------------------------------------------------------------------------------------------
 
     def _begin(self) -> None:
         """Find the sides at the start."""
-        look = self._agree()
-        on = self._lying_on(look, [self.state])
-        if on:
-            choice = self._at_rest(on, look) or self._chosen(on)
-            if choice.modes is None:
-                self._fail(on[0], f"the motion starts there, and {choice.why}")
-                self._unsettled = self.failure
-            else:
-                self._take(choice)
+        self._take_known_sides()
+        on = self._lying_on(self._agree(), self.state)
+        if on and not self._continues(self._chosen(on), on[0], "the motion starts there, and "):
+            self._unsettled = self.failure
 
-    def _at_rest(self, on: list[int], look: SurfaceValues) -> Continuation | None:
-        """How to continue if swings about two surfaces have decayed to rounding; None otherwise."""
-        resting = np.abs(look.u.astype(np.float64)) <= self._functions.swing_noises(look, self.state)
-        small = [i for i, mode in enumerate(self._modes) if i in on or abs(mode) >= HELD or resting[i]]
-        if len(small) < 2:
-            return None
-
-        def at(sides: Mapping[int, int], state: np.ndarray, time: Scalar) -> SurfaceValues:
-            return self._functions.look(state, time, self._parameters(dict(sides)))
-
-        meeting = Meeting(at, self._functions, np.array(self.state), self.time, self._epsilon)
-        kept = {j: self._modes[j] for j in (*self._along, *self._held)}
-        return meeting.rest(sorted({*small, *kept}), kept)
+    def _take_known_sides(self) -> None:
+        for j, side in self._moments.sides(self._integrator.dtime).items():
+            self._modes[j] = side
 
     def _keep_to_surfaces(self) -> None:
         """Remove the rounding that moved the state off the surfaces along which it slides."""
         state = self._integrator.state
-        look = self._look(state, self.time, self._low)
-        for j in (*self._along, *self._held):
-            gradient = look.gradients[j]
-            square = sum((g * g for g in gradient), gradient[0] * 0)
+        u, gradients = self._functions.exact(state, self.time, self._parameters())
+        for j in self._along:
+            square = sum((g * g for g in gradients[j]), gradients[j][0] * 0)
             if square != 0:
-                state[:] = state - (look.u[j] / square) * gradient
+                state[:] = state - (u[j] / square) * gradients[j]
 
-    def _lying_on(self, look: SurfaceValues, states: list[np.ndarray]) -> list[int]:
+    def _lying_on(self, look: SurfaceValues, *states: np.ndarray) -> list[int]:
         """Surfaces whose arguments are zero but for rounding of these states."""
-        near = np.abs(look.u.astype(np.float64)) <= self._functions.noises(look, states)
-        return [int(j) for j in np.flatnonzero(near)]
+        near = np.abs(look.u) <= look.noises(*states)
+        return [int(j) for j in np.flatnonzero(near[:, 0] & self._free)]
 
     @property
     def _window(self) -> float:
@@ -796,52 +698,58 @@ class SwitchingStepper(TaylorStepper):
         self._count += 1
         return self._count <= _MOST_SWITCHES
 
-    def _arrive(self, j: int, side: int, states: list[np.ndarray], again: bool) -> bool:
-        """Continue from a surface (``again``: as the step began); False if that is impossible."""
+    def _arrive(self, j: int, side: int, before: np.ndarray) -> bool:
+        """Continue from a surface on which a step ended; False if that is impossible."""
         self._crossed = j + 1
         if not self._counts(float(self.time)):
             return self._fail(j, f"its sides changed more than {_MOST_SWITCHES} times in almost no time")
         if self._modes[j] == SLIDES:
             self._modes[j] = side
-            for i, (by, sign) in self._held.items():
-                if by == j:
-                    self._modes[i] = sign * side
             self._enter()
             return True
         look = self._look(self.state, self.time, self._low)
-        on = [j, *self._along, *self._held]
-        on += [i for i in self._lying_on(look, states) if i not in on]
-        moments = [i for i in on if self._functions.moments[i].of_time]
-        alone = len(moments) == 1
-        if (again or not alone) and any(self._unresolved(i, alone) for i in moments):
-            why = (
-                f"something so strong changes that two numbers of {self.precision.name} precision don't tell "
-                "its impulse"
-            )
-            return self._fail(j, why, _NOT_RESOLVED)
-        choice = self._at_rest(on, look) or self._chosen(on, hint=(j, side))
-        if choice.modes is None:
-            return self._fail(j, choice.why)
-        self._take(choice)
-        return True
+        on = dict.fromkeys([j, *self._along, *self._lying_on(look, before, self.state)])
+        return self._continues(self._chosen(list(on), hint=(j, side)), j)
 
-    def _unresolved(self, j: int, alone: bool) -> bool:
-        """Whether the change of the field on a surface matters even for what two numbers leave out of its
-        moment. Where something ends alone the state tells its impulse, by which the rest is judged; where it
-        begins, nothing is known yet.
+    def _pass_knot(self, knot: tuple[Scalar, Scalar], before: np.ndarray) -> bool:
+        """Continue from a moment known as written; False if that is impossible."""
+        for off, earlier, later in self._moments.passed(knot):
+            changed = [j for j, side in later.items() if side != earlier[j]]
+            if changed and self._unresolved(off, earlier, later):
+                what = f"two numbers of {self.precision.name} precision don't tell its impulse"
+                return self._fail(changed[0], f"something so strong changes that {what}", _NOT_RESOLVED)
+        self._take_known_sides()
+        self._crossed = self._moments.timed[0] + 1 if self._moments.timed else 0
+        on = [*self._along, *self._lying_on(self._agree(), before, self.state)]
+        return not on or self._continues(self._chosen(list(dict.fromkeys(on))), on[0])
+
+    def _unresolved(self, off: float, earlier: Mapping[int, int], later: Mapping[int, int]) -> bool:
+        """Whether the change of the field at a moment matters even for what two numbers leave out of it.
+
+        Where something ends the state shows its impulse, by which the rest is judged; where it begins,
+        nothing is known yet.
         """
-        before, after = (
-            self._functions.look(self.state, self.time, self._parameters({j: side * self._modes[j]})).field
-            for side in (1, -1)
-        )
-        if alone and float(np.abs(after).max()) > float(np.abs(before).max()):
+        fields = [self._at(sides).field for sides in (earlier, later)]
+        if np.abs(fields[1]).max() > np.abs(fields[0]).max():
             return False
-        change = max(abs(float(x)) for x in after - before)
         size = max(1.0, *(abs(float(x)) for x in self.state))
-        allowed, time = _MOST_LEFT_OUT * self._epsilon * size, self._integrator.dtime
-        if change * self._epsilon**2 * abs(float(time[0])) <= allowed:
-            return False
-        return change * self._functions.moments[j].left_out(time, self._modes) > allowed
+        return bool(np.abs(fields[1] - fields[0]).max() * off > _MOST_LEFT_OUT * self._epsilon * size)
+
+    def _at(self, sides: Mapping[int, int]) -> SurfaceValues:
+        """The surfaces here, with other sides than those that the motion is on."""
+        return self._functions.look(self.state, self.time, self._parameters(dict(sides)))
+
+    def _continues(self, choice: Continuation, j: int, so: str = "") -> bool:
+        """Take the way to continue that was found; False if there is none."""
+        if choice.modes is None:
+            return self._fail(j, so + choice.why)
+        for i, mode in choice.modes.items():
+            self._modes[i] = mode
+        self._agree(choice.modes)
+        self._enter()
+        if self._along:
+            self._keep_to_surfaces()
+        return True
 
     def _agree(self, known: Collection[int] = ()) -> SurfaceValues:
         """Put all surfaces except the known ones on the sides where the state lies, since an argument that
@@ -849,49 +757,31 @@ class SwitchingStepper(TaylorStepper):
         """
         for _ in range(len(self._modes) + 1):
             look, changed = self._look(self.state, self.time, self._low), False
-            noises = self._functions.noises(look, [self.state])
-            for j, mode in enumerate(self._modes):
-                u = float(look.u[j])
-                beyond = mode * u < 0 and abs(u) > noises[j]
-                if beyond and j not in known and abs(mode) < HELD:
-                    self._modes[j], changed = -mode, True
+            wrong = -np.array(self._modes) * look.u[:, 0] > look.noises(self.state)[:, 0]
+            for j in np.flatnonzero(wrong & self._free).tolist():
+                if j not in known:
+                    self._modes[j], changed = -self._modes[j], True
             if not changed:
                 break
         return look
 
-    def _take(self, choice: Continuation) -> None:
-        assert choice.modes is not None
-        for j, mode in choice.modes.items():
-            self._modes[j] = mode
-        self._agree(choice.modes)
-        self._enter()
-        if self._along:
-            self._keep_to_surfaces()
-
     def _chosen(self, on: list[int], hint: tuple[int, int] | None = None) -> Continuation:
         """How to continue from the surfaces on which the state lies."""
 
-        def at(sides: dict[int, int]) -> SurfaceValues:
-            return self._functions.look(self.state, self.time, self._parameters(sides))
-
         moving = [j for j in on if hint is not None and j == hint[0]]
-        for j in on:
-            if j not in moving and j not in Fields(at, self._functions, [j]).tangential_surfaces():
-                moving.append(j)
+        moving += [j for j in on if j not in moving and j not in Fields(self._at, [j]).tangential]
         idle = {j: self._modes[j] or 1 for j in on if j not in moving}
         if not moving:
             return self._by_trial(idle)
-        crossed = (
-            crossings(at, self._functions, {j: self._modes[j] or 1 for j in moving})
-            if len(moving) > MOST_AT_ONCE
-            else {}
-        )
+        crossed = {}
+        if len(moving) > MOST_AT_ONCE:
+            crossed = crossings(self._at, {j: self._modes[j] or 1 for j in moving})
         moving = [j for j in moving if j not in crossed]
         if len(moving) > MOST_AT_ONCE:
             return Continuation(None, f"more than {MOST_AT_ONCE} surfaces meet there")
         if not moving:
             return Continuation({**idle, **crossed})
-        choice = Fields(lambda sides: at({**crossed, **sides}), self._functions, moving).choose()
+        choice = Fields(lambda sides: self._at({**crossed, **sides}), moving).choose()
         if choice.modes is not None:
             return Continuation({**idle, **crossed, **choice.modes})
         if not choice.tangential or hint is None or hint[0] in crossed:
@@ -930,12 +820,11 @@ class SwitchingStepper(TaylorStepper):
             for part in (1 / 16, 1 / 2, 1.0):
                 then = begin + self.precision.of_double(part) * (trial.time - begin)
                 look = self._look(np.array(trial.update_d_output(then)), then)
-                if abs(float(look.u[j])) > self._functions.noise(look, j, [before, np.array(trial.state)]):
-                    return 1 if look.u[j] > 0 else -1
+                if abs(look.u[j, 0]) > look.noises(before, trial.state)[j, 0]:
+                    return 1 if look.u[j, 0] > 0 else -1
             return found
         finally:
             self._integrator, self.log.muted = engine, muted
-            self._roots.clear()
 
     def _fail(self, j: int, why: str, what_to_do: str = "") -> bool:
         surface = self.system.plan.surfaces.found[j]
