@@ -72,7 +72,6 @@ class Load(SceneLoad):
         gradient_source: the distant body whose gradient it is, and nothing else.
         beside: the load that it acts beside, on the same source.
         reacts: whether its source is one of the point masses besides the body, and feels ``reaction``.
-        magnetic: whether it is of a magnetic field, ``flux_density``.
         seconds_ahead: by how much the time that it counts in is ahead of the scene's, which rounds it more.
         of_time: whether it is a series, whose arguments are multiples of time.
         wide: whether its expressions are too long to be unrolled (series of thousands of terms).
@@ -96,7 +95,6 @@ class Load(SceneLoad):
     gradient_source: Any = None
     beside: Any = None
     reacts: bool = False
-    magnetic: bool = False
     seconds_ahead: float = 0.0
     of_time: bool = False
     wide: bool = False

@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import date, time
 from decimal import Decimal
+from fractions import Fraction
 from itertools import product
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -20,6 +21,7 @@ from pydantic import (
     PlainValidator,
     StrictStr,
     WithJsonSchema,
+    model_validator,
 )
 from pydantic_core import PydanticCustomError, core_schema
 
@@ -34,10 +36,57 @@ _NUMBER_TEXT = r"^\s*[-+]?(\d|\.\d|pi)"
 T = TypeVar("T")
 
 
+Rule = Callable[[Any], str]
+"""What is wrong with the keys of a table together; empty if nothing is."""
+
+
+def _given(table: Any, keys: Iterable[str]) -> list[str]:
+    return [key for key in keys if key in table.model_fields_set and getattr(table, key) is not None]
+
+
+def one_of(*keys: str, least: int = 1, why: str = "") -> Rule:
+    """Exactly one of some keys, or with ``least`` 0 at most one."""
+
+    def rule(table: Any) -> str:
+        found = _given(table, keys)
+        need = f"exactly one of {', '.join(keys)} is needed" if least else "give one of them"
+        said = f"given {' and '.join(found) or 'none'}; {need}{why and f' ({why})'}"
+        return "" if least <= len(found) <= 1 else said
+
+    return rule
+
+
+def together(*keys: str) -> Rule:
+    """All of some keys, or none."""
+
+    def rule(table: Any) -> str:
+        missing = [key for key in keys if key not in _given(table, keys)]
+        said = f"missing {' and '.join(missing)}; {' and '.join(keys)} are given together, or none of them"
+        return said if 0 < len(missing) < len(keys) else ""
+
+    return rule
+
+
+def excludes(key: str, *others: str) -> Rule:
+    """None of some keys with another, which says the same."""
+
+    def rule(table: Any) -> str:
+        found = _given(table, others) if _given(table, [key]) else []
+        return (
+            f"given {' and '.join(found)} with {key}, which determines it; remove one of them"
+            if found
+            else ""
+        )
+
+    return rule
+
+
 class ConfigTable(BaseModel):
     """A TOML table: unknown keys are errors, values never change after reading, and the text below a key
-    describes it.
+    describes it. Its ``rules`` are about several keys together.
     """
+
+    rules: ClassVar[tuple[Rule, ...]] = ()
 
     model_config = ConfigDict(
         extra="forbid",
@@ -46,6 +95,12 @@ class ConfigTable(BaseModel):
         defer_build=True,
         use_attribute_docstrings=True,
     )
+
+    @model_validator(mode="after")
+    def _as_a_whole(self) -> Self:
+        for what in filter(None, (rule(self) for rule in self.rules)):
+            raise refuse(what)
+        return self
 
 
 NAME_OR_VECTOR = ("as a name", "as a vector")
@@ -169,6 +224,19 @@ class Range:
 
 Positive = Annotated[T, Range(lambda x: x > 0, "a positive {}")]
 NotNegative = Annotated[T, Range(lambda x: x >= 0, "zero or more")]
+
+
+def within(least: str, most: str) -> Range:
+    """Annotation of a number from one to another."""
+    return Range(lambda x: Fraction(least) <= x <= Fraction(most), f"{least} to {most}")
+
+
+def _directed(value: list[ExactNumber]) -> list[ExactNumber]:
+    if all(x.sign == 0 for x in value):
+        raise refuse("given [0, 0, 0]; a direction is needed")
+    return value
+
+
 Dimensionless = Annotated[ExactNumber, InUnit("1")]
 Metre = Annotated[ExactNumber, InUnit("m")]
 Kilogram = Annotated[ExactNumber, InUnit("kg")]
@@ -236,6 +304,8 @@ class Exactly:
 Pair = Annotated[list[T], Field(min_length=2, max_length=2), Exactly(2)]
 Triple = Annotated[list[T], Field(min_length=3, max_length=3), Exactly(3)]
 """A vector of three components."""
+Direction = Annotated[Triple[Dimensionless], AfterValidator(_directed)]
+"""A vector that isn't zero, of any length."""
 Four = Annotated[list[T], Field(min_length=4, max_length=4), Exactly(4)]
 """A quaternion's four components."""
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Self
+from typing import ClassVar
 
-from pydantic import Field, StrictStr, model_validator
+from pydantic import Field, StrictStr
 
 from rigidsim.scene.exact import ZERO
-from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Second, refuse
+from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Rule, Second, one_of
 from rigidsim.scene.registry import LoadFields
 
 PACES = ("period", "sidereal_period", "longitude_rate")
@@ -74,8 +74,16 @@ class SatelliteOrbit(Elements):
     key, opposite = "satellite_orbit", True
 
 
+SIDES = (
+    "orbit is the place of the source as seen from the body, satellite_orbit the body's own orbit about the "
+    "source"
+)
+
+
 class OrbitFields(LoadFields):
     """Keys of a load whose source and body are on a prescribed orbit, which is given from either side."""
+
+    rules: ClassVar[tuple[Rule, ...]] = (one_of("orbit", "satellite_orbit", least=0, why=SIDES),)
 
     orbit: Orbit | None = Field(
         default=None,
@@ -93,10 +101,3 @@ class OrbitFields(LoadFields):
     def elements(self) -> Orbit | SatelliteOrbit | None:
         """The one of both that is given."""
         return self.satellite_orbit if self.orbit is None else self.orbit
-
-    @model_validator(mode="after")
-    def _from_one_side(self) -> Self:
-        if self.orbit is not None and self.satellite_orbit is not None:
-            what = "given orbit and satellite_orbit; give one of them: orbit is the place of the source as "
-            raise refuse(what + "seen from the body, satellite_orbit the body's own orbit about the source")
-        return self

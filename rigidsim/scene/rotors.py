@@ -11,7 +11,15 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import Matrix, Vector, cross, diagonal, dot, eigen
 from rigidsim.scene.bodies.body import RigidBody
 from rigidsim.scene.exact import ZERO
-from rigidsim.scene.fields import ConfigTable, Dimensionless, Formula, Moment, Rate, Triple, VariableName
+from rigidsim.scene.fields import (
+    ConfigTable,
+    Direction,
+    Formula,
+    Moment,
+    NotNegative,
+    Rate,
+    VariableName,
+)
 from rigidsim.scene.tracing.numbers import plain
 
 _ROUNDING_OF_INPUT = 1e-14  # relative, of moments that a double-precision program printed
@@ -27,9 +35,9 @@ class RotorTable(ConfigTable):
 
     name: VariableName = Field(examples=["wheel"])
     """letters, digits and underscores, beginning with a letter; rate_NAME in expressions is its rate"""
-    axis: Triple[Dimensionless] = Field(examples=[[0, 0, 1]])
+    axis: Direction = Field(examples=[[0, 0, 1]])
     """direction of its axis, body axes; any length"""
-    moment: Moment = Field(examples=["0.01 kg m^2"])
+    moment: NotNegative[Moment] = Field(examples=["0.01 kg m^2"])
     """moment of inertia about its axis"""
     rate: Rate = Field(ZERO, examples=["300 rad/s", "3000 rpm"])
     """rate about its axis relative to the body, at the start"""

@@ -149,7 +149,6 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
     body = attempt(_body_at_start, config, context)
     attempt(starts.check_ways, config.initial, context)
     times = attempt(sample_times, config.time, context, config.texts)
-    attempt(_check_limits, config.limits)
     if body is None or times is None or problems:
         raise ConfigError(problems, source)
     start, end, samples = times
@@ -294,10 +293,3 @@ def _translation(config: schema.Config, body: RigidBody, context: Any) -> tuple[
     if body.mass is None:
         raise _fail("body", "mass", "missing; a body with a position or velocity needs it")
     return flight_start(config, context)
-
-
-def _check_limits(limits: schema.Limits) -> None:
-    for key in ("wall_time", "max_drift"):
-        value = getattr(limits, key)
-        if value is not None and value.sign <= 0:
-            raise _fail("limits", key, f"given {float(value):g}; a positive number is allowed")

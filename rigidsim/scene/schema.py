@@ -39,6 +39,7 @@ from rigidsim.scene.fields import (
     Momentum,
     OneOf,
     Pair,
+    Positive,
     Rate,
     Second,
     Speed,
@@ -217,11 +218,11 @@ class EventTable(ConfigTable):
 class Limits(ConfigTable):
     """``[limits]``: guards that stop the run, resumable, with the reason named."""
 
-    wall_time: Second | None = Field(None, examples=["2 h"])
+    wall_time: Positive[Second] | None = Field(None, examples=["2 h"])
     """time for integrating and recording in one session"""
     max_steps: StrictInt | None = Field(None, ge=1, examples=[1_000_000_000])
     """number of steps in one session, never exceeded"""
-    max_drift: Dimensionless | None = Field(None, examples=[1e-9])
+    max_drift: Positive[Dimensionless] | None = Field(None, examples=[1e-9])
     """largest relative drift of any invariant; the run ends with the first sample past it"""
 
 

@@ -51,11 +51,7 @@ class AxisTable(ConfigTable):
 
     @model_validator(mode="after")
     def _one_way(self) -> AxisTable:
-        ways = [way for way in WAYS if getattr(self, way) is not None]
-        if len(ways) != 1:
-            given = "none of them" if not ways else " and ".join(ways)
-            raise refuse(f"given {given}; exactly one of {', '.join(WAYS)} is needed")
-        [way] = ways
+        way = self.way
         if way == "sphere" and (self.count is None) == (self.grid is None):
             raise refuse(
                 "a sphere takes either count (random directions) or grid (polar angles and azimuths), "

@@ -99,7 +99,7 @@ def test_a_run_ends_where_the_network_does() -> None:
     [
         (
             {"keys": "f107 = 150\nf107a = 150"},
-            'number 2 ap: missing; density = "nrlmsise00" takes f107, f107a, ap',
+            "number 2: missing ap; f107 and f107a and ap are given together",
         ),
         ({"keys": "f107 = 150\nf107a = 150\nap = -1"}, "ap: given -1; 0 to 400 is allowed"),
         ({"epoch": ""}, 'density: given "nrlmsise00", a model of date and place, which takes [time] epoch'),

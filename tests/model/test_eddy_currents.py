@@ -88,9 +88,9 @@ def test_beside_a_magnet_in_the_same_field_the_momentum_along_it_is_kept() -> No
 @pytest.mark.parametrize(
     ("load", "message"),
     [
-        ("field = [1, 0, 0]", "conductivity: missing; a sphere needs conductivity and radius"),
+        ("field = [1, 0, 0]", "given none; exactly one of conductivity, magnetic_tensor"),
         ("field = [1, 0, 0]\nconductivity = 1\nradius = 1\nthickness = 2", "thickness: given 2; more than 0"),
-        ("field = [1, 0, 0]\nmagnetic_tensor = [1, 1, 1]\nradius = 1", "radius: given with magnetic"),
+        ("field = [1, 0, 0]\nmagnetic_tensor = [1, 1, 1]\nradius = 1", "given radius with magnetic"),
     ],
 )
 def test_nonsense_is_refused(load: str, message: str) -> None:

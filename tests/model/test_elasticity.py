@@ -159,7 +159,7 @@ orbit = {about = "planet", semi_major_axis = 1, eccentricity = 0.1, periapsis = 
     [
         ('love_number = -0.1, radius = "2 mm"', "0 (rigid) to 1.5"),
         ("love_number = 0.3, radius = 0.1", "up to 0.1 is allowed, since the response is linear"),
-        (f"{ELASTIC}, delay = -1", "an effect comes after its cause"),
+        (f"{ELASTIC}, delay = -1", "zero or more is allowed"),
         (f'{ELASTIC}, raised_by = ["planets"]', 'did you mean "planet"'),
         (f'{ELASTIC}, raised_by = ["drag"]', "the source of a gravity_gradient raises"),
     ],

@@ -97,7 +97,7 @@ def test_what_point_masses_leave_out() -> None:
     ("text", "setting", "words"),
     [
         (SCENE, "initial.position=; initial.velocity=", "for a body without a position"),
-        (SCENE, "loads[1].position=[1, 0, 0]", "given with source, which determines it"),
+        (SCENE, "loads[1].position=[1, 0, 0]", "given source and position; give one of them"),
         (SYSTEM, "bodies[0].position=[1, 0, 0]", "given with ephemeris = true, which determines it"),
     ],
 )

@@ -48,9 +48,9 @@ def test_the_torque_is_the_moment_cross_the_field_in_any_body_axes() -> None:
 @pytest.mark.parametrize(
     ("load", "message"),
     [
-        ("moment = [1, 0, 0]", "[[loads]] number 1 field: given neither field nor orbit; exactly one"),
-        (f"moment = [1, 0, 0]\nfield = [1, 0, 0]\n{ORBIT}", "field: given both field and orbit; exactly one"),
-        (f"moment = [1, 0, 0]\n{ORBIT}", "source_moment: missing; an orbit needs it"),
+        ("moment = [1, 0, 0]", "[[loads]] number 1: given none; exactly one of field, source_moment"),
+        (f"moment = [1, 0, 0]\nfield = [1, 0, 0]\n{ORBIT}", "given field and orbit; give one of them"),
+        (f"moment = [1, 0, 0]\n{ORBIT}", "given none; exactly one of field, source_moment"),
         (
             "moment = [1, 0, 0]\norbit = {semi_major_axis = 1}\nsource_moment = [1, 0, 0]",
             "orbit.period: missing; give it, or gravitational_parameter",
@@ -85,7 +85,7 @@ def test_in_flight_the_field_is_that_at_the_body() -> None:
     ("load", "message"),
     [
         (f"source_moment = [0, 0, 1e22]\n{AROUND}", "remove it and gravitational_parameter"),
-        ("", "field: given neither field nor source_moment; exactly one of them is needed"),
+        ("", "given none; exactly one of field, source_moment is needed"),
         ("source_moment = [0, 0, 1e22]\nposition = [6900e3, 1e6, 0]", "the body starts at the dipole"),
     ],
 )

@@ -17,8 +17,12 @@ from typing import Any
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.loads.attractor_keys import AttractorFieldTable, coefficients_of
-from rigidsim.model.loads.central_gravity import CentralGravity, CentralGravityFields
+from rigidsim.model.loads.central_gravity import (
+    AttractorFieldTable,
+    CentralGravity,
+    CentralGravityFields,
+    coefficients_of,
+)
 from rigidsim.model.loads.figure_in_flight import refuse_inside
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.turning_harmonics import Outward, TurningHarmonics, frame_of

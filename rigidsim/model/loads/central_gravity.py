@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, StrictStr, field_validator, model_validator
 
 from rigidsim.model.gradient import tidal_range
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.loads.attractor_keys import AttractorFieldTable
 from rigidsim.model.loads.kernel_attractor import KernelAttractor
 from rigidsim.model.loads.point_attraction import (
     MovingAttractor,
     PointAttraction,
+    given_strength,
     kernel_strength,
-    positive_strength,
 )
 from rigidsim.model.loads.source_figure import FigureFields
 from rigidsim.model.plausibility import (
@@ -29,23 +30,108 @@ from rigidsim.model.plausibility import (
 )
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
+from rigidsim.scene.bodies.gravity_field import MOST, Harmonic
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.exact import ZERO
-from rigidsim.scene.fields import BodyName, GravitationalParameter, Metre, Rate, Triple
+from rigidsim.scene.fields import (
+    Angle,
+    BodyName,
+    ConfigTable,
+    Dimensionless,
+    Direction,
+    GravitationalParameter,
+    Metre,
+    Positive,
+    Rate,
+    Triple,
+    excludes,
+    one_of,
+    refuse,
+)
 from rigidsim.scene.orbit_keys import Orbit
 from rigidsim.scene.orbits import attracting_body
 from rigidsim.scene.point_masses import closest
 from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.validation_messages import shown
 
 _ROUNDED = 0.999  # of the distance for which estimates are made, and the pericentre but for rounding
+
+
+_KEY = re.compile(r"(0|[1-9]\d{0,3}),(0|[1-9]\d{0,3})")
+_WITHIN = 2
+"""Radii within which the attracting body's mass is (see ``rigidsim.scene.bodies.gravity_field``)."""
+
+
+class AttractorFieldTable(ConfigTable):
+    """``gravity_field`` of ``central_gravity``: coefficients in axes that turn about the pole at a rate."""
+
+    radius: Positive[Metre] = Field(examples=["6378.1366 km"])
+    """reference radius R of C and S"""
+    C: dict[StrictStr, Dimensionless] = Field(default_factory=dict, examples=[{"2,0": -1.0826e-3}])
+    """unnormalized coefficients of cos m lon by "degree,order", from degree 2 on: C_20 is minus J2"""
+    S: dict[StrictStr, Dimensionless] = Field(default_factory=dict, examples=[{"2,2": -9.0387e-7}])
+    """likewise with sin m lon"""
+    pole: Direction = Field(examples=[[0, 0, 1]])
+    """direction of its axis of rotation, space axes"""
+    rate: Rate = Field(ZERO, examples=["7.2921151e-5 rad/s"], json_schema_extra={"default": 0})
+    """rate at which it turns about the pole"""
+    prime_meridian: Angle = Field(ZERO, examples=["100 deg"], json_schema_extra={"default": 0})
+    """angle of longitude 0 at time 0 from its equator's node on the plane XY (from X if they coincide)"""
+
+    @field_validator("C", "S")
+    @classmethod
+    def _orders(cls, value: dict[str, Any], info: Any) -> dict[str, Any]:
+        for key in value:
+            _refuse_key(key, info.field_name)
+        return value
+
+    @model_validator(mode="after")
+    def _some(self) -> AttractorFieldTable:
+        if not self.C and not self.S:
+            raise refuse('missing coefficients; give C = {"2,0" = ..} and S = {"2,2" = ..}')
+        return self
+
+
+def _refuse_key(key: str, table: str) -> None:
+    match = _KEY.fullmatch(key)
+    if match is None:
+        raise refuse(f'given the key {shown(key)}; degree and order are allowed, such as "2,0"')
+    n, m = int(match[1]), int(match[2])
+    if n < 2:
+        what = "the attracting point is its centre of mass" if n == 1 else "gravitational_parameter says it"
+        raise refuse(f'given "{key}", but degree {n} isn\'t given here, since {what}; remove it')
+    if n > MOST:
+        raise refuse(f'given "{key}"; degrees up to {MOST} are allowed')
+    if m > n:
+        raise refuse(f'given "{key}", but the order is at most the degree: "{n},{n}"')
+    if table == "S" and m == 0:
+        raise refuse(f'given "{key}" in S, which has no order 0; zonal coefficients are in C')
+
+
+def coefficients_of(table: AttractorFieldTable, around: Setting) -> dict[Harmonic, Any]:
+    """Coefficients (mpf), unnormalized, without zeros; refused where no mass has them."""
+    context, found = around.context, {}
+    for name, given in (("C", table.C), ("S", table.S)):
+        for key, value in given.items():
+            n, m = map(int, key.split(","))
+            ratio = context.mpf(math.factorial(n - m)) / math.factorial(n + m)
+            most = 2 * _WITHIN**n * context.sqrt(ratio)
+            if abs(float(value)) > most:
+                what = f'given {float(value):.8g} as "{key}" (unnormalized); no mass within {_WITHIN} radii '
+                what += f"has more than {context.nstr(most, 3)}: check normalization and signs of exponents"
+                raise around.fault(f"gravity_field.{name}", what)
+            if value.sign != 0:
+                found[n, m, name == "S"] = value.at(context)
+    return dict(sorted(found.items()))
 
 
 class CentralGravityFields(FigureFields):
     """A point that attracts a freely flying body: force and torque to second degree."""
 
+    rules = (one_of("orbit", "source", "position", least=0), excludes("orbit", "gravitational_parameter"))
     kind: Literal["central_gravity"]
-    gravitational_parameter: GravitationalParameter | None = Field(
+    gravitational_parameter: Positive[GravitationalParameter] | None = Field(
         default=None, description="G M of the attracting point", examples=["3.986004418e14 m^3/s^2"]
     )
     source: BodyName | None = Field(
@@ -99,9 +185,6 @@ class CentralGravity(PointAttraction):
             if fields.orbit.body is None:
                 raise around.fault("orbit", "given without body; the name of one of [[bodies]] is allowed")
             number = attracting_body(fields.orbit, around)
-            for key in ("gravitational_parameter", "position", "source"):
-                if key in fields.model_fields_set:
-                    raise around.fault(key, "given with orbit.body, which determines it; remove it")
             if around.carried_bodies.host is not None:
                 what = 'given "central_gravity", but [body] host makes the body one of [[bodies]], which '
                 raise around.fault("kind", what + 'attract each other anyway; give "gravity_gradient"')
@@ -110,13 +193,11 @@ class CentralGravity(PointAttraction):
             what = 'given "central_gravity" for a body without a position; give [initial] position and '
             raise around.fault("kind", f'{what}velocity, or use "gravity_gradient" for a prescribed orbit')
         if fields.source is not None:
-            if "position" in fields.model_fields_set:
-                raise around.fault("position", "given with source, which determines it; remove it")
             strength = kernel_strength(fields.gravitational_parameter, fields.source, around)
             if fields.source != around.host:  # which is the origin of the space axes
                 return KernelAttractor.of(fields.source, strength, around)
         else:
-            strength = positive_strength(fields.gravitational_parameter, around)
+            strength = given_strength(fields.gravitational_parameter, around)
         place = [x.at(around.context) for x in fields.position]
         if around.position == place:
             raise around.fault("kind", "the body starts at the attracting point; start it elsewhere")

@@ -30,7 +30,7 @@ from rigidsim.scene.bodies.presets import known_body
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import Expression, evaluate, names_used
-from rigidsim.scene.fields import Dimensionless, Metre, NumberOrFormula, Positive
+from rigidsim.scene.fields import Dimensionless, Metre, NumberOrFormula, Positive, together, within
 from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.point_masses import kepler_reach
 from rigidsim.scene.registry import LoadFields, Setting, register_load
@@ -46,21 +46,22 @@ Density = Annotated[Any, NumberOrFormula("kg/m^3")]
 class DragFields(LoadFields):
     """Drag on the body's surfaces of the air about the body that it flies about."""
 
+    rules = (together("altitude", "scale_height"), together("f107", "f107a", "ap"))
     kind: Literal["drag"]
     density: Density = Field(
         description="of the air: a number, an expression of altitude, t, the state and [parameters], or "
         '"nrlmsise00", the Earth\'s by that model',
         examples=["4e-12 kg/m^3", "nrlmsise00"],
     )
-    f107: Dimensionless | None = Field(
+    f107: Annotated[Dimensionless, within("60", "400")] | None = Field(
         default=None,
         description="of nrlmsise00: solar flux at 10.7 cm of the day before, 1e-22 W/m^2/Hz",
         examples=[150],
     )
-    f107a: Dimensionless | None = Field(
+    f107a: Annotated[Dimensionless, within("60", "400")] | None = Field(
         default=None, description="of nrlmsise00: its mean of 81 days", examples=[150]
     )
-    ap: Dimensionless | None = Field(
+    ap: Annotated[Dimensionless, within("0", "400")] | None = Field(
         default=None, description="of nrlmsise00: the day's geomagnetic index Ap", examples=[7]
     )
     scale_height: Positive[Metre] | None = Field(
@@ -89,7 +90,9 @@ class Drag(SurfaceLoad):
             raise around.fault("", what + "and a central_gravity (atmosphere_rate there turns the air)")
         pushes = Pushes(around, cls.title, RELATIVE_NAMES)
         half, factors, law = around.context.one / 2, [], None
-        _refuse_indices(fields, around)
+        if (fields.density == NRLMSISE) != (fields.ap is not None):
+            given = "missing" if fields.ap is None else f"given with another density than {NRLMSISE}"
+            raise around.fault("ap", f'{given}; density = "{NRLMSISE}" takes {", ".join(INDICES)}')
         if fields.density == NRLMSISE:
             factors.append(pushes.parsed(AIR_DENSITY))
         elif isinstance(fields.density, ExactNumber):
@@ -177,24 +180,8 @@ def _range(part: Expression, reach: tuple[Any, Any], scene: Scene) -> float:
     return float(context.maximum(found) - context.minimum(found))
 
 
-def _refuse_indices(fields: DragFields, around: Setting) -> None:
-    """Require the indices of the Sun and the field with the model alone, within what they have been."""
-    for key in INDICES:
-        value, most = getattr(fields, key), 400
-        if value is None and fields.density == NRLMSISE:
-            raise around.fault(key, f'missing; density = "{NRLMSISE}" takes {", ".join(INDICES)}')
-        if value is not None and fields.density != NRLMSISE:
-            raise around.fault(key, f'given without density = "{NRLMSISE}", which takes it; remove it')
-        least = 0 if key == "ap" else 60
-        if value is not None and not least <= float(value) <= most:
-            raise around.fault(key, f"given {float(value):g}; {least} to {most} is allowed")
-
-
 def _falling(fields: DragFields, around: Setting) -> list[Expression]:
     """The factor by which the density falls with the altitude, if it does."""
-    if (fields.scale_height is None) != (fields.altitude is None):
-        missing = "scale_height" if fields.scale_height is None else "altitude"
-        raise around.fault(missing, "missing; altitude and scale_height are given together, or neither")
     if fields.scale_height is None or fields.altitude is None:
         return []
     if not isinstance(fields.density, ExactNumber):

@@ -14,7 +14,6 @@ from decimal import Decimal
 from typing import Any
 
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.loads.magnetic_keys import IGRF, MagneticFieldFields
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.turning_harmonics import TurningHarmonics
 from rigidsim.scene.arithmetic import Vector, apply, transpose
@@ -25,6 +24,7 @@ from rigidsim.scene.geomagnetic_field import MOST, RADIUS, igrf
 from rigidsim.scene.registry import Setting
 from rigidsim.scene.tracing.numbers import plain
 
+IGRF = "igrf"
 _LEAST = 0.99
 """Radii from the centre below which a start is refused; the poles are at 0.998."""
 
@@ -35,17 +35,15 @@ class EarthField:
 
     Attributes:
         harmonics: unnormalized, with the Earth's axes at time 0 and its rate.
-        strengths: of each degree, T: the root of the sum of squares of its Schmidt coefficients (mpf).
         epoch: the date.
     """
 
     harmonics: TurningHarmonics
-    strengths: dict[int, Any]
     epoch: Epoch
 
     @classmethod
-    def of(cls, fields: MagneticFieldFields, around: Setting) -> EarthField:
-        """The field that the keys ask for; refused where date and axes aren't known."""
+    def of(cls, degree: int | None, around: Setting) -> EarthField:
+        """The field to a degree; refused where date and axes aren't known."""
         axes = around.axes or (around.ephemeris.axes if around.ephemeris is not None else None)
         epoch, context = around.epoch, around.context
         known = (
@@ -59,23 +57,22 @@ class EarthField:
         assert epoch is not None
         assert axes is not None
         try:
-            given = igrf(epoch, fields.field_degree or MOST)
+            given = igrf(epoch, degree or MOST)
             for second in (around.start, around.end):
                 igrf(epoch.uniform().after(Decimal(round(plain(second)))), 1)
             frame = earth_axes(epoch, axes, context)
         except ValueError as error:
             why = f'given "{IGRF}" for a run from {epoch}; {error}: a run within 1970 to 2029 is allowed'
             raise around.fault("field", why) from None
-        coefficients, squares = {}, dict.fromkeys(range(1, max(n for n, _, _ in given) + 1), context.zero)
+        coefficients = {}
         for (n, m, sine), value in given.items():
             tesla = ExactNumber(value / 10**9).at(context)
             share = context.mpf(math.factorial(n - m)) / math.factorial(n + m)
-            squares[n] += tesla**2
             if value:
                 coefficients[n, m, sine] = tesla * (context.sqrt(2 * share) if m else 1)
         radius = context.mpf(RADIUS)
         harmonics = TurningHarmonics(coefficients, radius, frame, rotation_rate(context))
-        return cls(harmonics, {n: context.sqrt(x) for n, x in squares.items()}, epoch)
+        return cls(harmonics, epoch)
 
     def dipole(self, constant: Any) -> Vector:
         """The magnetic moment of degree 1 at time 0, space axes, A m^2 (mpf).
@@ -88,23 +85,13 @@ class EarthField:
         moment = [size * c[key] for key in ((1, 1, False), (1, 1, True), (1, 0, False))]
         return apply(transpose(self.harmonics.frame), moment)
 
-    def most(self, far: Any) -> Any:
-        """A bound of B at a distance, T: |B_n| <= (n + 1) s_n (R/r)^(n+2), by the addition theorem."""
-        ratio = self.harmonics.radius / far
-        return sum((n + 1) * s * ratio ** (n + 2) for n, s in self.strengths.items())
-
-    def at(self, context: Any, place: Vector, time: Any) -> Vector:
-        """B (mpf, T, space axes) at a place seen from the Earth's centre, m, and a time, s."""
-        return self.harmonics.at(context, place, time)
-
     def over(self, m: Kinematics, centre: Vector, size: Any) -> list[Symbolic]:
         """B over a size (mpf, T), space axes."""
         which = IGRF, self.epoch, self.harmonics.degree, *centre, size
         if which not in m.made:
             unit = m.scene.context.ldexp(m.scene.context.one, m.scaling.length)
             ratio = self.harmonics.radius / unit
-            sizes = {n: ratio ** (n + 2) / size for n in self.strengths}
-            m.made[which] = self.harmonics.vector(m, m.seen_from(centre), sizes.__getitem__)
+            m.made[which] = self.harmonics.vector(m, m.seen_from(centre), lambda n: ratio ** (n + 2) / size)
         return m.made[which]
 
     def within(self, far: Any) -> bool:

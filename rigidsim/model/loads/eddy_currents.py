@@ -9,8 +9,7 @@ from pydantic import Field
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Term
-from rigidsim.model.loads.magnetic_field import InMagneticField
-from rigidsim.model.loads.magnetic_keys import MagneticFieldFields, numbers
+from rigidsim.model.loads.magnetic_field import InMagneticField, MagneticFieldFields, numbers
 from rigidsim.scene.arithmetic import (
     Vector,
     across,
@@ -23,7 +22,7 @@ from rigidsim.scene.arithmetic import (
     unit_vectors,
 )
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.fields import InUnit, Metre, NotNegative, Positive, Triple
+from rigidsim.scene.fields import InUnit, Metre, NotNegative, Positive, Triple, excludes, one_of, together
 from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
 
@@ -34,6 +33,12 @@ MagneticTensor = Annotated[ExactNumber, InUnit("S m^4")]
 class EddyCurrentsFields(MagneticFieldFields):
     """Torque (M (w x B)) x B of the currents that a magnetic field induces in a conductor turning in it."""
 
+    rules = (
+        *MagneticFieldFields.rules,
+        one_of("conductivity", "magnetic_tensor", why="the latter for a conductor that is no sphere"),
+        excludes("magnetic_tensor", "radius", "thickness"),
+        together("conductivity", "radius"),
+    )
     kind: Literal["eddy_currents"]
     conductivity: NotNegative[Conductivity] | None = Field(
         default=None, description="of a conducting sphere, with its radius", examples=["3.5e7 S/m"]
@@ -41,7 +46,7 @@ class EddyCurrentsFields(MagneticFieldFields):
     radius: Positive[Metre] | None = Field(
         default=None, description="of the sphere, outside", examples=["30 cm"]
     )
-    thickness: Metre | None = Field(
+    thickness: Positive[Metre] | None = Field(
         default=None, description="of the wall of a hollow sphere; a solid one without it", examples=["2 mm"]
     )
     magnetic_tensor: Triple[NotNegative[MagneticTensor]] | None = Field(
@@ -70,9 +75,9 @@ class EddyCurrents(InMagneticField):
     @classmethod
     def resolve(cls, fields: EddyCurrentsFields, around: Setting) -> EddyCurrents:
         if fields.magnetic_tensor is not None:
-            moments = _of_tensor(fields.magnetic_tensor, fields, around)
+            moments = numbers(fields.magnetic_tensor, around)
         else:
-            moments = _of_sphere(fields, around)
+            moments = [_of_sphere(fields, around)] * 3
         return cls(moments=moments, **cls.field_of(fields, around))
 
     def acts(self) -> bool:
@@ -124,28 +129,14 @@ class EddyCurrents(InMagneticField):
         return scene.context.zero  # it only removes energy
 
 
-def _of_tensor(given: list[ExactNumber], fields: EddyCurrentsFields, around: Setting) -> Vector:
-    for key in ("conductivity", "radius", "thickness"):
-        if getattr(fields, key) is not None:
-            raise around.fault(key, "given with magnetic_tensor, which determines it; remove one of them")
-    return numbers(given, around)
-
-
-def _of_sphere(fields: EddyCurrentsFields, around: Setting) -> Vector:
-    for key in ("conductivity", "radius"):
-        value = getattr(fields, key)
-        if value is None:
-            what = "missing; a sphere needs conductivity and radius, any other conductor magnetic_tensor"
-            raise around.fault(key, what)
+def _of_sphere(fields: EddyCurrentsFields, around: Setting) -> Any:
     assert fields.conductivity is not None
     assert fields.radius is not None
     context, radius = around.context, fields.radius.at(around.context)
     inside = context.zero
     if fields.thickness is not None:
-        thickness = fields.thickness.at(context)
-        if fields.thickness.sign <= 0 or thickness > radius:
+        inside = radius - fields.thickness.at(context)
+        if inside < 0:
             what = f"given {float(fields.thickness):g}; more than 0, up to the radius, is allowed"
             raise around.fault("thickness", what)
-        inside = radius - thickness
-    moment = 2 * context.pi / 15 * fields.conductivity.at(context) * (radius**5 - inside**5)
-    return [moment] * 3
+    return 2 * context.pi / 15 * fields.conductivity.at(context) * (radius**5 - inside**5)

@@ -13,25 +13,20 @@ the state.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeVar
 
 import heyoka as hy
 
+from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.distortion import Distortion, SeenTide, total
 from rigidsim.model.gradient import GradientSource
 from rigidsim.model.inertia import ConstantInertia, MassDistribution
 from rigidsim.model.kinematics import Kinematics, in_common_unit, inertia_times
 from rigidsim.model.load import Load, Term, loads_of
-from rigidsim.model.loads.elastic_keys import (
-    ElasticEffects,
-    about_keys,
-    elastic_values,
-    fault,
-    refuse_delay,
-)
+from rigidsim.model.load_words import span_words
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic, transpose
 from rigidsim.model.rotations import apply as turned
@@ -39,21 +34,65 @@ from rigidsim.model.scaling import Scaling, source_rate
 from rigidsim.model.two_part import rounded
 from rigidsim.scene.arithmetic import Matrix, Vector, apply, dot, norm, working_epsilon
 from rigidsim.scene.attitude import rotation_matrix
-from rigidsim.scene.cautions import Caution
+from rigidsim.scene.cautions import Caution, WarningCode
+from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
-from rigidsim.scene.registry import Setting, register_load
+from rigidsim.scene.registry import Setting, names_of, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.tracing.numbers import plain
+from rigidsim.scene.validation_messages import nearest
 
 T = TypeVar("T")
 _MOST = 0.1  # of a moment, up to which a linear response makes sense
 
 
+WHERE = "[body] elasticity"
+_LATE, _TOO_LATE = 0.3, 1.0
+"""Radians by which body and source together may turn within the delay: at the first, what the expansion
+leaves out is some percent of what the delay does, which is told, and at the second about as much.
+"""
+_WIDE = (0.05, 1.0)
+"""C/(M R^2) of a body whose mean radius is R: 2/5 is a sphere's, 0.21 Saturn's."""
+_SMALLEST_IN_KM = 0.01
+"""Of a number that may have been meant in km: nobody gives less than ten metres so."""
+_RAISING = "gravity_gradient"
+_DERIVATIVES = 2  # of the place
+
+
+def fault(key: str, text: str) -> ConfigError:
+    """The error that names a key."""
+    return ConfigError(Problem(f"{WHERE} {key}".rstrip(), text))
+
+
+def _raising(config: Config, names: list[str] | None) -> tuple[int, ...]:
+    """Places of the named loads, or of all gravity gradients."""
+    kinds = [fields.kind for fields in config.loads]  # type: ignore[attr-defined]
+    if names is None:
+        return tuple(n for n, kind in enumerate(kinds) if kind == _RAISING)
+    known = {name: n for n, fields in enumerate(config.loads) for name in names_of(fields)}
+    for name in names:
+        if name not in known:
+            allowed = ", ".join(known) or f"none, since no {_RAISING} has a name"
+            raise fault("raised_by", f'given "{name}"{nearest(name, known)}; allowed: {allowed}')
+        if kinds[known[name]] != _RAISING:
+            what = f'given "{name}", a load of kind {kinds[known[name]]}; the source of a {_RAISING} raises '
+            raise fault("raised_by", what + "tides: name that, or add one")
+    found = tuple(known[name] for name in names)
+    if len(set(found)) < len(found):
+        raise fault("raised_by", "the same source is named twice; name each once")
+    return found
+
+
+def _of_sources(config: Config, raising: tuple[int, ...]) -> str:
+    names = [next(iter(names_of(config.loads[n])), f"[[loads]] number {n + 1}") for n in raising]
+    return f"tides of {', '.join(names)}" if names else "tides"
+
+
 @register_load(body="elasticity")
 @dataclass(frozen=True)
-class Elasticity(ElasticEffects, Load):
+class Elasticity(Load):
     """The distortion; numbers are mpf, SI."""
 
     love_number: Any
@@ -68,6 +107,7 @@ class Elasticity(ElasticEffects, Load):
     wide = True  # some hundreds of expressions
     changes = "the moments of an elastic body vary"
     conservative = True  # its work is told by ``supplied_power``
+    nothing = {"love_number": 0}  # noqa: RUF012
 
     @classmethod
     def brought_by(cls, config: Config) -> bool:
@@ -75,7 +115,45 @@ class Elasticity(ElasticEffects, Load):
 
     @classmethod
     def resolve(cls, fields: Config, around: Setting) -> Elasticity:
-        return cls(*elastic_values(fields, around))
+        table, context = fields.body.elasticity, around.context
+        assert table is not None
+        love, radius, delay = (x.at(context) for x in (table.love_number, table.radius, table.delay))
+        if around.free_flight:
+            what = "given for a body with a position or velocity, whose flight treats it as rigid; leave "
+            raise fault("", what + "out [initial] position and velocity, and give the source's orbit")
+        if any(isinstance(x, str) for x in fields.body.principal_moments or []):
+            what = "given with principal_moments that vary; only one of them can change the tensor"
+            raise fault("", what)
+        if fields.initial.angular_momentum is not None:
+            what = "given with [body] elasticity, on which it depends what the rates are then; give "
+            raise ConfigError(Problem("[initial] angular_momentum", what + "angular_velocity"))
+        rate = None if table.mean_rate is None else table.mean_rate.at(context)
+        raising = _raising(fields, table.raised_by)
+        named = [source for n in raising if (source := getattr(fields.loads[n], "source", None)) is not None]
+        seen = around.ephemeris
+        sights = () if seen is None else tuple((seen.sight(x, around.host), _DERIVATIVES) for x in named)
+        return cls(love, radius, delay, rate, raising, sights, table.spin)
+
+    @staticmethod
+    def effect_parts(fields: Config) -> Iterator[EffectPart]:
+        """Its delay; tides and the spin's distortion, where there are both."""
+        table = fields.body.elasticity
+        assert table is not None
+        missing = "" if table.delay.sign else "it is 0"
+        yield EffectPart("delay", "delay of the distortion", {"delay": 0}, missing=missing)
+        raising = _raising(fields, table.raised_by)
+        both = bool(raising) and table.spin
+        missing = "" if both else "no source raises any" if table.spin else "they are all that distorts"
+        yield EffectPart("tides", _of_sources(fields, raising), {"raised_by": []}, missing=missing)
+        missing = "" if both else "it is all that distorts" if table.spin else "spin is false"
+        yield EffectPart("spin", "distortion by the spin", {"spin": False}, missing=missing)
+
+    @staticmethod
+    def without_loads(config: Config, names: Collection[str]) -> Mapping[str, Any]:
+        """Sources that are gone raise no tides."""
+        given = config.body.elasticity and config.body.elasticity.raised_by
+        kept = [name for name in given or [] if name not in names]
+        return {"raised_by": kept} if kept != (given or []) else {}
 
     @cached_property
     def strength(self) -> Any:
@@ -203,7 +281,13 @@ class Elasticity(ElasticEffects, Load):
             what = f"given numbers by which the tensor changes by up to {float(plain(distorted)):.3g} of the "
             what += f"least moment; up to {_MOST:g} is allowed, since the response is linear: check "
             raise fault("", what + "love_number, radius, and G M and distances of the sources")
-        refuse_delay(plain(self.delay), self.turned_within(scene))
+        if (angle := self.turned_within(scene)) > _TOO_LATE:
+            what = (
+                f"given {span_words(plain(self.delay))}, in which body and source turn by {angle:.3g} rad; "
+            )
+            raise fault(
+                "delay", what + f"up to {_TOO_LATE:g} is allowed, since what it does is a series in it"
+            )
         least, count = working_epsilon(scene.context) / 4, 0
         left = distorted * factor
         while left > least:
@@ -217,7 +301,8 @@ class Elasticity(ElasticEffects, Load):
         return float(plain(self.delay * (rate + fastest)))
 
     def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
-        yield from about_keys(fields, scene, plain(self.delay), self.turned_within(scene))
+        yield from _about_radius(fields, scene)
+        yield from _about_delay(plain(self.delay), self.turned_within(scene))
 
     # --- at the start, in numbers ---------------------------------------------------------------------------
 
@@ -327,3 +412,28 @@ class Elasticity(ElasticEffects, Load):
 
 def _rounded(m: Kinematics, matrix: Matrix) -> Matrix:
     return [[rounded(m.number(x)) if x != 0 else 0 for x in row] for row in matrix]
+
+
+def _about_delay(delay: Any, turned: float) -> Iterator[Caution]:
+    """A delay whose expansion leaves out a part of what it does."""
+    if turned > _LATE:
+        text = (
+            f"{WHERE} delay: in {span_words(delay)} body and source turn by {turned:.2g} rad, of which the "
+        )
+        text += f"expansion to second order leaves out some {turned**2 / 6:.1%} of what the delay does"
+        yield Caution(WarningCode.DELAY_TOO_LONG, text)
+
+
+def _about_radius(body: Any, scene: Scene) -> Iterator[Caution]:
+    """A radius without a unit that suits the body's mass and moments in km; ``body`` are the keys."""
+    given, mass = body.elasticity.radius, scene.body.mass
+    if mass is None or not given.assumed or float(given) < _SMALLEST_IN_KM:
+        return
+    largest = float(plain(max(scene.body.principal_moments)))
+    if _WIDE[0] < largest / (float(plain(mass)) * (1e3 * float(given)) ** 2) < _WIDE[1]:
+        number = f"{float(given):.10g}"
+        text = (
+            f"{WHERE} radius: given {number} without a unit, which is taken as m, while the body's mass and "
+        )
+        text += f'moments suit as many km; write "{number} km" if that is meant, "{number} m" if not'
+        yield Caution(WarningCode.LENGTH_WITHOUT_UNIT, text)

@@ -88,12 +88,6 @@ class FluidCore(Load):
         moment, flattening, friction = (
             x.at(context) for x in (table.moment, table.flattening, table.friction)
         )
-        if not 0 <= moment < 1:
-            raise _fault("moment", f"given {_text(moment)}; a part of the body's own, from 0 to below 1, is")
-        if not 0 <= flattening <= 0.5:
-            raise _fault("flattening", f"given {_text(flattening)}; a number from 0 to 0.5 is")
-        if friction < 0:
-            raise _fault("friction", f"given {_text(friction)} s^-1; a positive rate or 0 is")
         if any(x != 0 for x in body.center_of_mass):
             what = (
                 "given for a body that turns about another point than its centre of mass, about which a core "

@@ -13,7 +13,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.gradient import GradientSource, gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, SourcePlace, Term
-from rigidsim.model.loads.point_attraction import MovingGradient, kernel_strength, positive_strength
+from rigidsim.model.loads.point_attraction import MovingGradient, given_strength, kernel_strength
 from rigidsim.model.loads.source_figure import FigureFields
 from rigidsim.model.orbit_planes import OrbitPlane
 from rigidsim.model.placements.kernel_body import PlacedByKernel, refuse_series
@@ -24,9 +24,9 @@ from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, norm
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.epochs import J2000, Epoch
-from rigidsim.scene.fields import BodyName, GravitationalParameter, Metre, Triple
+from rigidsim.scene.fields import BodyName, GravitationalParameter, Metre, Positive, Triple, one_of
 from rigidsim.scene.kernels.reading import Sight
-from rigidsim.scene.orbit_keys import OrbitFields
+from rigidsim.scene.orbit_keys import SIDES, OrbitFields
 from rigidsim.scene.orbits import KeplerOrbit, attracting_body, resolve_orbit, resolve_tabulated_orbit
 from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
@@ -39,8 +39,9 @@ _PLACES = ("orbit", "satellite_orbit", "position", "ephemeris", "source")
 class GravityGradientFields(OrbitFields, FigureFields):
     """Torque of a distant attracting body, to second degree (MacCullagh's formula)."""
 
+    rules = (one_of(*_PLACES, why=SIDES),)
     kind: Literal["gravity_gradient"]
-    gravitational_parameter: GravitationalParameter | None = Field(
+    gravitational_parameter: Positive[GravitationalParameter] | None = Field(
         default=None, description="G M of the attracting body", examples=["3.986004418e14 m^3/s^2"]
     )
     position: Triple[Metre] | None = Field(
@@ -75,24 +76,18 @@ class GravityGradient(GradientSource, Load):  # type: ignore[override]
     @classmethod
     def resolve(cls, fields: GravityGradientFields, around: Setting) -> Load:
         if fields.orbit is not None and fields.orbit.body is not None:
-            for key in ("gravitational_parameter", *_PLACES[1:]):
-                if getattr(fields, key) is not None:
-                    raise around.fault(key, "given with orbit.body, which determines it; remove it")
+            if fields.gravitational_parameter is not None:
+                what = "given with orbit.body, which determines it; remove it"
+                raise around.fault("gravitational_parameter", what)
             made = MovingGradient(around.carried_bodies, attracting_body(fields.orbit, around))
             if made.masses.host is None and made.masses.full:
                 what = 'given "gravity_gradient" for a body that flies by itself under coupling = "full"; '
                 raise around.fault("kind", what + 'give "central_gravity", whose force the bodies feel')
             return made
-        given = [key for key in _PLACES if getattr(fields, key) is not None]
-        if len(given) != 1:
-            found, places = " and ".join(given) or "none", f"{', '.join(_PLACES[:-1])} and {_PLACES[-1]}"
-            what = f"given {found}; exactly one of {places} is needed (orbit is the place of the source as "
-            what += "seen from the body, satellite_orbit the body's own orbit about the source)"
-            raise around.fault("orbit", what)
         if fields.source is not None:
             placement = PlacedByKernel.of(fields.source, around)
             return cls(kernel_strength(fields.gravitational_parameter, fields.source, around), placement)
-        strength, context = positive_strength(fields.gravitational_parameter, around), around.context
+        strength, context = given_strength(fields.gravitational_parameter, around), around.context
         if fields.elements is not None and fields.elements.table is not None:
             return cls(strength, PlacedByTable(resolve_tabulated_orbit(fields.elements, strength, around)))
         if fields.elements is not None:

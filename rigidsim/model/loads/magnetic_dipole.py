@@ -4,22 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import heyoka as hy
+from pydantic import Field
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Term
-from rigidsim.model.loads.magnetic_field import InMagneticField
-from rigidsim.model.loads.magnetic_keys import MagneticDipoleFields, numbers
+from rigidsim.model.loads.magnetic_field import InMagneticField, MagneticFieldFields, numbers
 from rigidsim.model.names import written
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, across, cross, diagonal, norm, unit_vectors
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import Constant, Expression, states_read
+from rigidsim.scene.fields import NumberOrFormula, Triple
 from rigidsim.scene.readable import number_text
 from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
+
+
+class MagneticDipoleFields(MagneticFieldFields):
+    """Torque m x B on a dipole of the body, in a uniform ``field`` (space axes), or in the field of a centred
+    dipole ``source_moment`` (space axes) around which the body moves on an orbit, or in flight as it flies.
+    """
+
+    kind: Literal["magnetic_dipole"]
+    moment: Triple[Annotated[Any, NumberOrFormula("A m^2")]] = Field(
+        description="magnetic moment of the body, body axes: numbers, or expressions of t, the state, "
+        "bx by bz and [parameters], such as a law of magnetorquers; zero for a field alone",
+        examples=[["0 A m^2", "0 A m^2", "0.5 A m^2"]],
+    )
 
 
 @register_load

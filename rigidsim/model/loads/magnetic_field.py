@@ -1,42 +1,145 @@
-"""A magnetic field as loads know it: uniform, of a dipole along an orbit or in flight, or the Earth's."""
+"""A magnetic field as loads know it: uniform, of a dipole along an orbit or in flight, or the Earth's; and
+``bx by bz``, the field where the body is, body axes.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import random
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Annotated, Any, ClassVar, Literal, cast
 
 import heyoka as hy
+from pydantic import Field, StrictInt, Tag
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, SourcePlace, loads_of
 from rigidsim.model.load_words import length_text, value_text
 from rigidsim.model.loads.central_gravity import CentralGravity
-from rigidsim.model.loads.earth_field import EarthField
-from rigidsim.model.loads.magnetic_keys import (
-    IGRF,
-    MagneticFieldFields,
-    field_parts,
-    numbers,
-    refuse_contradictions,
-)
-from rigidsim.model.magnetic_names import FIELD_NAMES
+from rigidsim.model.loads.earth_field import IGRF, EarthField
 from rigidsim.model.plausibility import about_orbit
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.sources import free_flight, in_body_axes, read_in
 from rigidsim.model.two_part import rounded
 from rigidsim.scene.arithmetic import Vector, dot, norm
 from rigidsim.scene.bodies.presets import EARTH
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.expressions.names import PLACES, NameProvider, Readable, provides
+from rigidsim.scene.fields import (
+    NAME_OR_VECTOR,
+    GravitationalParameter,
+    InUnit,
+    Metre,
+    Positive,
+    Rule,
+    Triple,
+    name_or_vector,
+    one_of,
+)
+from rigidsim.scene.geomagnetic_field import MOST
+from rigidsim.scene.orbit_keys import OrbitFields
 from rigidsim.scene.orbits import KeplerOrbit, resolve_orbit
 from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.schema import Config
 from rigidsim.scene.tracing.numbers import plain
 
+FIELD_NAMES = ("bx", "by", "bz")
 _FIELD_CONSTANT = "1e-7"
 """mu_0 / 4 pi, T m/A: CODATA 2022 has 0.99999999987(16) times this, measured since the SI of 2019."""
+
+
+MagneticMoment = Annotated[ExactNumber, InUnit("A m^2")]
+FluxDensity = Annotated[ExactNumber, InUnit("T")]
+
+
+class MagneticFieldFields(OrbitFields):
+    """Keys of a magnetic field: uniform, or of a dipole about which the body moves, or the Earth's."""
+
+    rules: ClassVar[tuple[Rule, ...]] = (
+        *OrbitFields.rules,
+        one_of("field", "source_moment"),
+        one_of("field", "orbit", "satellite_orbit", least=0),
+    )
+    kind: str
+    field: (
+        Annotated[
+            Annotated[Literal["igrf"], Tag(NAME_OR_VECTOR[0])]
+            | Annotated[Triple[FluxDensity], Tag(NAME_OR_VECTOR[1])],
+            name_or_vector('"igrf" (the Earth\'s) or a vector in space axes'),
+        ]
+        | None
+    ) = Field(
+        default=None,
+        description='uniform flux density, space axes; or "igrf", the Earth\'s field, which turns with it, '
+        "for a body in flight",
+        examples=[["30 uT", 0, 0], "igrf"],
+    )
+    field_degree: StrictInt | None = Field(
+        default=None,
+        ge=1,
+        le=MOST,
+        description=f"degree of the igrf: 1 is a tilted dipole; by default {MOST}, all of it",
+        examples=[6],
+    )
+    source_moment: Triple[MagneticMoment] | None = Field(
+        default=None,
+        description="magnetic moment of the source, space axes, with orbit, satellite_orbit or in flight",
+        examples=[[0, 0, -7.7e22]],
+    )
+    position: Triple[Metre] | None = Field(
+        default=None,
+        description="place of the source, space axes, for a body with a position; by default the "
+        "point of its central_gravity",
+        examples=[[0, 0, 0]],
+    )
+    gravitational_parameter: Positive[GravitationalParameter] | None = Field(
+        default=None, description="G M of the source, from which the orbit's period follows"
+    )
+
+    def placed_by(self, *, free_flight: bool) -> frozenset[str] | None:
+        if self.elements is not None:
+            return frozenset()
+        return frozenset({"flight"}) if free_flight and self.of_place else None
+
+    @property
+    def of_place(self) -> bool:
+        """Whether the field of a body in flight is that where it is."""
+        return self.source_moment is not None or self.field == IGRF
+
+
+def numbers(values: list[ExactNumber], around: Setting) -> Vector:
+    """Values of a key as mpf."""
+    return [x.at(around.context) for x in values]
+
+
+def _refuse_elsewhere(fields: MagneticFieldFields, around: Setting) -> None:
+    """Refuse keys that go with a flight, or with an orbit, where the body has none."""
+    host = around.bodies is not None and around.bodies.host is not None
+    if fields.elements is not None and (around.free_flight or host):
+        why = "has a position, where the field is taken; give source_moment alone"
+        why = why if around.free_flight else "is one of [[bodies]]; a uniform field is allowed"
+        raise around.fault(fields.elements.key, f"given for a body that {why}")
+    if fields.field_degree is not None and fields.field != IGRF:
+        raise around.fault("field_degree", f'given without field = "{IGRF}", whose degree it is; remove it')
+    if fields.elements is None and fields.gravitational_parameter is not None:
+        raise around.fault(
+            "gravitational_parameter", "given without an orbit, whose period it is for; remove it"
+        )
+    if fields.of_place and fields.elements is None and not around.free_flight:
+        key = "field" if fields.field == IGRF else "source_moment"
+        what = (
+            "given for a body without a place; give [initial] position and velocity, or source_moment with "
+        )
+        raise around.fault(key, what + "an orbit, or a uniform field")
+    if fields.position is not None and not (around.free_flight and fields.of_place):
+        what = (
+            f'given; allowed with source_moment or "{IGRF}", for a body with [initial] position and velocity'
+        )
+        raise around.fault("position", what)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,31 +155,25 @@ class InMagneticField(Load):
     place: Vector | None = None  # None if it doesn't fly about a dipole
     name: str = ""
     earth: EarthField | None = None  # whose field it is; the source is then its dipole at time 0
-    magnetic = True
 
     @classmethod
     def field_of(cls, fields: MagneticFieldFields, around: Setting) -> dict[str, Any]:
         """What the keys say of the field, worked out: source, orbit, place and name."""
         flies = around.free_flight and fields.of_place
-        refuse_contradictions(fields, around)
-        strength = fields.gravitational_parameter
-        if strength is not None and (fields.elements is None or strength.sign <= 0):
-            allowed = "with an orbit only" if fields.elements is None else "as a positive number only"
-            raise around.fault("gravitational_parameter", f"given {float(strength):g}; allowed {allowed}")
+        _refuse_elsewhere(fields, around)
+        strength, context = fields.gravitational_parameter, around.context
         found: dict[str, Any] = {"name": fields.name or ""}
         if fields.field == IGRF:
-            earth = EarthField.of(fields, around)
-            found |= {"earth": earth, "source": earth.dipole(around.context.mpf(_FIELD_CONSTANT))}
-        elif flies or fields.elements is not None:
-            found["source"] = numbers(fields.source_moment or [], around)
+            earth = EarthField.of(fields.field_degree, around)
+            found |= {"earth": earth, "source": earth.dipole(context.mpf(_FIELD_CONSTANT))}
         else:
-            found["source"] = numbers(cast("list[ExactNumber]", fields.field), around)
+            found["source"] = numbers(fields.source_moment or cast("list[ExactNumber]", fields.field), around)
         if flies:
-            found["place"] = [] if fields.position is None else numbers(fields.position, around)
+            found["place"] = numbers(fields.position or [], around)
             if found["place"] == around.position:
                 raise around.fault("position", "the body starts at the dipole; start it elsewhere")
         elif fields.elements is not None:
-            motion = None if strength is None else strength.at(around.context)
+            motion = None if strength is None else strength.at(context)
             for key in ("body", "table"):
                 if getattr(fields.elements, key, None) is not None:
                     what = f"given for a {fields.kind}, which takes elements alone; gravity_gradient takes a "
@@ -86,7 +183,17 @@ class InMagneticField(Load):
 
     @staticmethod
     def effect_parts(fields: MagneticFieldFields) -> Iterator[EffectPart]:
-        return field_parts(fields)
+        """Each degree of the Earth's field above the first, with those above it."""
+        if fields.field != IGRF:
+            yield EffectPart("igrf", "the Earth's magnetic field", missing=f'field isn\'t "{IGRF}"')
+            return
+        most = fields.field_degree or MOST
+        for n in range(most, 1, -1):
+            words = f"degrees {n} to {most}" if n < most else f"degree {n}"
+            wider = tuple(f"field-degree-{d}" for d in range(2, n))
+            yield EffectPart(
+                f"field-degree-{n}", f"{words} of the Earth's magnetic field", {"field_degree": n - 1}, wider
+            )
 
     def read_by(self, names: frozenset[str]) -> bool:
         """On an orbit, whose states it brings: its field, or names of its source."""
@@ -142,7 +249,7 @@ class InMagneticField(Load):
             return self.source
         place, context = self.source_at_start(scene), scene.context
         if self.earth is not None:
-            return self.earth.at(context, [-x for x in place], scene.start)
+            return self.earth.harmonics.at(context, [-x for x in place], scene.start)
         far = norm(context, place)
         along, size = dot(self.source, place) / far, context.mpf(_FIELD_CONSTANT) / far**3
         return [size * (3 * along * x / far - e) for e, x in zip(self.source, place, strict=True)]
@@ -156,8 +263,6 @@ class InMagneticField(Load):
 
     def most(self, scene: Scene) -> Any:
         """Largest field, T: of a dipole over its poles at pericentre."""
-        if self.earth is not None:
-            return self.earth.most(self._nearest(scene))
         size = self._size(scene)
         if self.uniform:
             return size
@@ -240,3 +345,51 @@ class InMagneticField(Load):
     def cautions(self, fields: MagneticFieldFields, where: str, scene: Scene) -> Iterator[Caution]:
         if self.orbit is not None and fields.elements is not None:
             yield from about_orbit(fields.elements, self.orbit, fields.gravitational_parameter, where, scene)
+
+
+@provides
+class FieldNames(NameProvider):
+    """The sum of all fields, in which one that several loads give counts once."""
+
+    brings = "bx, by, bz with the field of a magnetic_dipole"
+
+    def names(self, config: Config) -> Iterable[Readable]:
+        """See ``NameProvider``."""
+        flies, states, found = free_flight(config), {"attitude", PLACES}, False
+        for fields in config.loads:
+            if isinstance(fields, MagneticFieldFields):
+                found, states = True, states | (fields.placed_by(free_flight=flies) or set())
+        return (Readable(name, "T", frozenset(states)) for name in FIELD_NAMES if found)
+
+    def at_start(self, scene: Scene) -> Mapping[str, Any]:
+        """See ``NameProvider``."""
+        if not read_in(scene) & set(FIELD_NAMES):
+            return {}
+        found = [load.flux_density_at_start(scene) for load in _fields_of(scene)]
+        return dict(zip(FIELD_NAMES, in_body_axes(scene, _total(found)), strict=True))
+
+    def at_random(
+        self, scene: Scene, start: Mapping[str, Any], generator: random.Random
+    ) -> Mapping[str, Any]:
+        """Any field, about as large as at the start."""
+        size = norm(scene.context, list(start.values())) if start else scene.context.zero
+        return {name: size * scene.context.mpf(generator.gauss(0, 1)) for name in start}
+
+    def expressions(self, m: Kinematics, names: Collection[str]) -> Mapping[str, Any]:
+        """See ``NameProvider``."""
+        if not set(names) & set(FIELD_NAMES):
+            return {}
+        found = [load.flux_density(m) for load in _fields_of(m.scene)]
+        return dict(zip(FIELD_NAMES, _total(found), strict=True))
+
+
+def _total(vectors: list[list[Any]]) -> list[Any]:
+    return [sum(x[1:], x[0]) for x in zip(*vectors, strict=True)]
+
+
+def _fields_of(scene: Scene) -> list[InMagneticField]:
+    found: list[InMagneticField] = []
+    for load in scene.given_loads:
+        if isinstance(load, InMagneticField) and not any(load.same_field(x) for x in found):
+            found.append(load)
+    return found

@@ -104,12 +104,10 @@ class PointAttraction(Load):
         return m.number(sum(m.numbers.inertia[i][i] for i in range(3)))
 
 
-def positive_strength(given: Any, around: Setting) -> Any:
-    """A gravitational parameter, m^3/s^2 (mpf); refused if it is missing or isn't positive."""
+def given_strength(given: Any, around: Setting) -> Any:
+    """A gravitational parameter, m^3/s^2 (mpf); refused if it is missing."""
     if given is None:
         raise around.fault("gravitational_parameter", "missing; it is needed")
-    if given.sign <= 0:
-        raise around.fault("gravitational_parameter", f"given {float(given):g}; a positive number is allowed")
     return given.at(around.context)
 
 
@@ -117,7 +115,7 @@ def kernel_strength(given: Any, source: str, around: Setting) -> Any:
     """The gravitational parameter (mpf, m^3/s^2) of a body of the kernel: as given, or the kernel's own."""
     ephemeris = kernel_body(source, around)
     if given is not None:
-        return positive_strength(given, around)
+        return given_strength(given, around)
     found = ephemeris.kernel.strength(source)
     if found is None:
         what = f'missing; {ephemeris.kernel.name} has none of "{source}"'

@@ -66,11 +66,8 @@ class Rotor(Load):
         if min(body.principal_moments) == 0:
             what = "given in a body without a moment about one of its axes, which a rotor can't turn; remove "
             raise around.fault("", what + "the rotor, or give the body all three moments")
-        if all(x == 0 for x in axis):
-            raise around.fault("axis", "given [0, 0, 0]; a direction is needed")
-        if moment < 0 or (moment == 0 and not fields.fixed):
-            allowed = "zero or more is allowed" if fields.fixed else "a positive moment is allowed"
-            raise around.fault("moment", f"given {float(plain(moment)):g}; {allowed}")
+        if moment == 0 and not fields.fixed:
+            raise around.fault("moment", "given 0; a positive moment is allowed")
         if fields.fixed and fields.torque is not None:
             what = "given with fixed = true, which keeps the rate by whatever torque that takes; remove one"
             raise around.fault("torque", what)

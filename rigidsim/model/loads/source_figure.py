@@ -32,10 +32,10 @@ from rigidsim.scene.fields import (
     NAME_OR_VECTOR,
     ConfigTable,
     Dimensionless,
+    Direction,
     Metre,
     Positive,
     Range,
-    Triple,
     name_or_vector,
 )
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
@@ -64,8 +64,7 @@ class SourceFigure(ConfigTable):
     radius: Positive[Metre] = Field(examples=["6378.137 km"])
     """its equatorial radius, to which J2 refers"""
     pole: Annotated[
-        Annotated[Literal["iau1976"], Tag(NAME_OR_VECTOR[0])]
-        | Annotated[Triple[Dimensionless], Tag(NAME_OR_VECTOR[1])],
+        Annotated[Literal["iau1976"], Tag(NAME_OR_VECTOR[0])] | Annotated[Direction, Tag(NAME_OR_VECTOR[1])],
         name_or_vector('"iau1976" (the Earth\'s, by precession and nutation) or a vector in space axes'),
     ] = Field(examples=["iau1976", [0, 0, 1]])
     """direction of its axis of figure: a vector in space axes, or iau1976, the Earth's of date"""
@@ -257,8 +256,6 @@ class FigureAttraction(Load):
             return replace(made, epoch=around.epoch, axes=around.axes)
         pole = [x.at(context) for x in given.pole]
         size = norm(context, pole)
-        if size == 0:
-            raise around.fault("figure.pole", "given [0, 0, 0]; a vector along the source's axis is allowed")
         return replace(made, pole=[x / size for x in pole])
 
 

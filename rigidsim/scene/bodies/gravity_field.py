@@ -21,7 +21,7 @@ from pydantic import Field, StrictInt, StrictStr, field_validator, model_validat
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.bodies.field_files import FieldFileError, read_field
 from rigidsim.scene.exact import rounded
-from rigidsim.scene.fields import ConfigTable, Dimensionless, Metre, Positive, refuse
+from rigidsim.scene.fields import ConfigTable, Dimensionless, Metre, Positive, excludes, one_of, refuse
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.tracing.numbers import plain
 from rigidsim.scene.validation_messages import shown
@@ -48,6 +48,7 @@ Harmonic = tuple[int, int, bool]
 class GravityFieldTable(ConfigTable):
     """``[body] gravity_field``: coefficients in body axes, or a file of them."""
 
+    rules = (one_of("file", "radius"), excludes("file", "C", "S"), excludes("radius", "degree"))
     radius: Positive[Metre] | None = Field(None, examples=["1738 km"])
     """reference radius R of C and S"""
     C: dict[StrictStr, Dimensionless] | None = Field(None, examples=[{"3,0": -8.4e-6, "3,1": 2.8e-5}])
@@ -68,16 +69,8 @@ class GravityFieldTable(ConfigTable):
 
     @model_validator(mode="after")
     def _one_source(self) -> GravityFieldTable:
-        listed = [key for key in ("radius", "C", "S") if getattr(self, key) is not None]
-        if self.file is not None and listed:
-            raise refuse(f"given file with {' and '.join(listed)}; either file, or radius with C and S")
-        if self.file is None:
-            if self.radius is None:
-                raise refuse("missing radius, the reference radius of C and S; or give file")
-            if not self.C and not self.S:
-                raise refuse('missing coefficients; give C = {"3,0" = ..} and S = {"3,1" = ..}, or file')
-            if self.degree is not None:
-                raise refuse("given degree without file; leave out the coefficients that aren't wanted")
+        if self.file is None and not self.C and not self.S:
+            raise refuse('missing coefficients; give C = {"3,0" = ..} and S = {"3,1" = ..}, or file')
         return self
 
 

@@ -24,12 +24,16 @@ from rigidsim.scene.fields import (
     Metre,
     Moment,
     MomentOrFormula,
+    NotNegative,
     OneOf,
     PerSecond,
+    Positive,
+    Range,
     Rate,
     Second,
     Triple,
     name_or_vector,
+    within,
 )
 
 _SIZES = {
@@ -99,14 +103,18 @@ class Part(Solid):
     """sequence of euler_angles; by default [integrator] euler_sequence"""
 
 
+_LOVE = Range(lambda x: 0 <= x <= 1.5, "0 (rigid) to 1.5 (a fluid)")
+_PART = Range(lambda x: 0 <= x < 1, "a part of the body's own, from 0 to below 1,")
+
+
 class ElasticityTable(ConfigTable):
     """How tides and the spin distort the body's tensor of inertia."""
 
-    love_number: Dimensionless = Field(examples=[0.0216])
+    love_number: Annotated[Dimensionless, _LOVE] = Field(examples=[0.0216])
     """Love number k2 of degree 2: 0 (rigid) to 1.5 (a homogeneous fluid)"""
-    radius: Metre = Field(examples=["1738 km"])
+    radius: Positive[Metre] = Field(examples=["1738 km"])
     """radius that the Love number refers to"""
-    delay: Second = Field(ZERO, examples=["0.108 day"])
+    delay: NotNegative[Second] = Field(ZERO, examples=["0.108 day"])
     """time by which the distortion lags behind its cause; without one nothing is dissipated"""
     mean_rate: Rate | None = Field(None, examples=["0.2299715 rad/day"])
     """spin about the figure axis whose distortion is in the body's moments already; by default the rate at
@@ -133,11 +141,13 @@ Reference = Annotated[
 class Core(ConfigTable):
     """A fluid core that turns by itself: symmetric about the body's axis of largest moment."""
 
-    moment: Dimensionless = Field(examples=[0.0007])
+    moment: Annotated[
+        Dimensionless, Range(lambda x: 0 <= x < 1, "a part of the body's own, from 0 to below 1,")
+    ] = Field(examples=[0.0007])
     """its moment about that axis, over the body's own, which includes it; at least 0 and below 1"""
-    flattening: Dimensionless = Field(ZERO, examples=[3.8e-4])
+    flattening: Annotated[Dimensionless, within("0", "0.5")] = Field(ZERO, examples=[3.8e-4])
     """(C_c - A_c) / C_c of its moments, from 0 to 0.5: by it the mantle's pressure turns it"""
-    friction: PerSecond = Field(ZERO, examples=["1.5e-8 day^-1"])
+    friction: NotNegative[PerSecond] = Field(ZERO, examples=["1.5e-8 day^-1"])
     """torque of the mantle on it per difference of their rates, over the body's largest moment"""
     angular_velocity: Triple[Rate] | None = Field(None, examples=[[0, 0, "13 deg/day"]])
     """its angular velocity relative to space at the start, body axes; by default the body's"""
