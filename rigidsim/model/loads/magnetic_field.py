@@ -120,7 +120,7 @@ def _refuse_elsewhere(fields: MagneticFieldFields, around: Setting) -> None:
     """Refuse keys that go with a flight, or with an orbit, where the body has none."""
     host = around.bodies is not None and around.bodies.host is not None
     if fields.elements is not None and (around.free_flight or host):
-        why = "has a position, where the field is taken; give source_moment alone"
+        why = "has a position, where the field is taken: remove it and gravitational_parameter"
         why = why if around.free_flight else "is one of [[bodies]]; a uniform field is allowed"
         raise around.fault(fields.elements.key, f"given for a body that {why}")
     if fields.field_degree is not None and fields.field != IGRF:
