@@ -25,7 +25,7 @@ from rigidsim.model.averaged.free_motion import FreeMotion
 from rigidsim.model.averaged.resonance import SlowStart
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import apply, cross, dot, norm
-from rigidsim.scene.choices import FULL, ORBIT_AVERAGED
+from rigidsim.scene.choices import FULL, MEAN, ORBIT_AVERAGED
 from rigidsim.scene.exact import fraction_of
 from rigidsim.scene.sample_times import SampleTimes
 from rigidsim.scene.scene import Scene
@@ -303,7 +303,7 @@ def _starting(
     step = Fraction(end - begin) / (count - 1)
     samples = SampleTimes(instant, step, None, count, context)
     moved = replace(scene, start=samples.start, end=samples.last, samples=samples)
-    if begin == float(scene.start):
+    if begin == float(scene.start) and scene.config.model.start != MEAN:
         return moved
     if average.resonance is not None:
         slow = SlowStart(list(states[:4]), [scene.context.ldexp(x, exponent) for x in states[4:7]])
@@ -381,7 +381,14 @@ def in_model(
 ) -> InitialValueProblem:
     """A scene's motion in a model of some level, in double precision; ``average`` if it is known already."""
     config = scene.config.as_motion(names, precision="double", tolerance="auto", formulation="auto")
-    model = config.model.model_copy(update={"level": level, "short_period": short_period})
+    # geodetic precession adds to either alike, and a window's start is that of the full motion
+    update = {
+        "level": level,
+        "short_period": short_period,
+        "start": "osculating",
+        "geodetic_precession": False,
+    }
+    model = config.model.model_copy(update=update)
     plain = replace(scene, config=config.model_copy(update={"model": model}), events=())
     return compactly(prepare_scene(prepared.experiment, plain, loads=prepared.python_loads, along=average))
 

@@ -81,8 +81,13 @@ def reference_plane(m: Mechanics) -> ReferencePlane:
             given = ", ".join(context.nstr(x, 17) for x in scene.reference)
             described = f"plane with the normal [{given}] in space axes"
         return fixed_plane(m, scene.reference, described)
-    plane = _orbit_plane(m.loads)
-    fixed = plane.fixed(scene)
+    return orbit_plane(m, m.loads)
+
+
+def orbit_plane(m: Mechanics, loads: Sequence[Load]) -> ReferencePlane:
+    """The plane of the first load that has one."""
+    plane = _orbit_plane(loads)
+    fixed = plane.fixed(m.scene)
     if fixed is not None:
         return fixed_plane(m, fixed, plane.described)
     return _moving(plane.normal(m), plane.described)
@@ -91,6 +96,13 @@ def reference_plane(m: Mechanics) -> ReferencePlane:
 def initial_normal(scene: Scene, loads: Sequence[Load]) -> Vector:
     """Approximate normal at the start (mpf, space axes), not of unit length."""
     return scene.reference if scene.reference is not None else _orbit_plane(loads).at_start(scene)
+
+
+def initial_plane(scene: Scene, load: Load) -> Matrix:
+    """X', Y' and the unit normal (mpf) of the plane of a load's source at the start."""
+    normal = _orbit_plane([load]).at_start(scene)
+    size = norm(scene.context, normal)
+    return plane_axes(scene.context, [x / size for x in normal])
 
 
 def plane_drift(scene: Scene, loads: Sequence[Load]) -> Any | None:

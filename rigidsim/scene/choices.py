@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 AUTO = "auto"
+MEAN = "mean"
+"""``[model] start`` of an averaged motion that begins where it is given."""
 FULL, SPIN_AVERAGED, ORBIT_AVERAGED = "full", "spin_averaged", "orbit_averaged"
 REDUCED = (SPIN_AVERAGED, ORBIT_AVERAGED)
 """Levels that carry only the momentum's direction; later ones average more."""

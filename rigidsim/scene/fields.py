@@ -251,6 +251,7 @@ Speed = Annotated[ExactNumber, InUnit("m/s")]
 Acceleration = Annotated[ExactNumber, InUnit("m/s^2")]
 GravitationalParameter = Annotated[ExactNumber, InUnit("m^3/s^2")]
 Damping = Annotated[ExactNumber, InUnit("kg m^2/s")]
+Irradiance = Annotated[ExactNumber, InUnit("W/m^2")]
 AnyQuantity = Annotated[ExactNumber, InUnit("")]
 
 

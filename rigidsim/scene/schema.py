@@ -6,8 +6,10 @@ axis without inertia, ...) is checked where the scene is built.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
+from fractions import Fraction
 from functools import lru_cache
 from typing import Annotated, Any, Literal, Self, Union
 
@@ -24,6 +26,7 @@ from pydantic import (
 
 from rigidsim.scene.bodies.table import Body
 from rigidsim.scene.choices import DEFAULT_METHOD, REDUCED
+from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import BODY_NAMES
 from rigidsim.scene.expressions.tree import RESERVED
 from rigidsim.scene.fields import (
@@ -35,11 +38,13 @@ from rigidsim.scene.fields import (
     EachOnce,
     ElementLines,
     Four,
+    Irradiance,
     Metre,
     Momentum,
     OneOf,
     Pair,
     Positive,
+    Range,
     Rate,
     Second,
     Speed,
@@ -143,11 +148,39 @@ class Model(ConfigTable):
     """add back, to first order, what averaging removed: the nutation with the orbital periods, and the offset
     of figure and spin axes from the angular momentum
     """
+    order: Literal[1, 2] = 2
+    """order of the averaged equations: 1 leaves out the terms of second order, as the literature's equations
+    of precession do
+    """
+    start: Literal["osculating", "mean"] = "osculating"
+    """whether [initial] is the motion at that moment, or the averaged one already, as published poles are"""
+    geodetic_precession: StrictBool = False
+    """add the geodetic precession of the body on its orbits (1.92 arcsec a century for the Earth)"""
+
+    @model_validator(mode="after")
+    def _of_averages(self) -> Self:
+        given = [key for key in ("order", "start", "geodetic_precession") if key in self.model_fields_set]
+        if given and self.level == "full":
+            raise refuse(f'{given[0]} is given with level = "full"; it is of averaged levels: leave it out')
+        return self
 
     @property
     def reduced(self) -> bool:
         """Whether the model averages anything."""
         return self.level in REDUCED
+
+
+class Insolation(ConfigTable):
+    """``[output] insolation``: where on a planet, and when in its year, insolation is recorded."""
+
+    latitude: Annotated[Angle, Range(lambda x: abs(x) <= math.pi / 2, "-90 to 90 deg")] = Field(
+        examples=["65 deg"]
+    )
+    """geographic latitude"""
+    solar_longitude: Angle = Field(examples=["90 deg"])
+    """ecliptic longitude of the Sun from the moving equinox; 90 deg is the June solstice"""
+    constant: Irradiance = Field(ExactNumber(Fraction(13607, 10)), examples=["1360.7 W/m^2"])
+    """irradiance at a distance of the semi-major axis"""
 
 
 class Output(ConfigTable):
@@ -181,6 +214,10 @@ class Output(ConfigTable):
     """the body in that kernel, by its name or number, or the number of axes in a binary one; by default
     [body] host, or the only axes of a binary kernel
     """
+    insolation: Insolation | None = Field(
+        None, examples=[{"latitude": "65 deg", "solar_longitude": "90 deg"}]
+    )
+    """latitude and longitude of the Sun of the recorded insolation"""
     tip: Triple[Metre] | None = Field(None, examples=[[0, 0, 0.1]])
     """the point whose path is recorded as tip, in body axes from the reference point; by default the centre
     of mass of a body that turns about another point

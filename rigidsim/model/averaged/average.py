@@ -25,7 +25,7 @@ from rigidsim.model.orbits.prescribed import Carried
 from rigidsim.model.scaling import Scaling
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, negligible, norm, working_bits
-from rigidsim.scene.choices import ORBIT_AVERAGED
+from rigidsim.scene.choices import MEAN, ORBIT_AVERAGED
 from rigidsim.scene.scene import Scene
 
 _ROUNDS = 4  # iterations; each gains a factor of the nutation's size
@@ -34,7 +34,8 @@ DIRECTION = ["sx", "sy", "sz"]
 """States: direction of the momentum, space axes; its mean if nothing is added back."""
 TOLD = (
     "angular_momentum", "angular_momentum_norm", "energy", "figure_axis", "spin_axis", "momentum_axis",
-    "right_ascension", "declination", "obliquity", "node_longitude", "point_mass_position",
+    "right_ascension", "declination", "obliquity", "node_longitude", "point_mass_position", "precession",
+    "longitude_of_perihelion_of_date", "climatic_precession", "orbit_eccentricity", "insolation",
     "source_position",
     "point_mass_velocity", "orbital_energy", "orbital_angular_momentum", "orbital_linear_momentum",
 )  # fmt: skip
@@ -146,8 +147,9 @@ def average_of(
         if resonance is not None:
             return _resonant(scene, resonance, sources)
         vector = apply(matrix, momentum)
-        removed = _left_out_at_start(scene, motion, wobble, sources)
-        vector = [x - context.mpf(float(y)) for x, y in zip(vector, removed, strict=True)]
+        if table.start != MEAN:
+            removed = _left_out_at_start(scene, motion, wobble, sources)
+            vector = [x - context.mpf(float(y)) for x, y in zip(vector, removed, strict=True)]
         if alone:
             return _driven(scene, alone, sources, unit(context, vector), scaling, known=along is not None)
         motion = free_motion(context, body, momentum, norm(context, vector))
@@ -157,7 +159,7 @@ def average_of(
     start, energy = unit(context, vector), dot(momentum, scene.angular_velocity) / 2
     figure = _figure(scene, motion)
     found = Average(table.level, table.short_period, motion, sources, start, energy, figure)
-    if found.over_orbits:
+    if found.over_orbits and table.start != MEAN:
         return replace(found, start=_mean_over_orbits(scene, found))
     return found
 

@@ -27,6 +27,8 @@ from rigidsim.scene.kepler import plane_vectors
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 
+_LIGHT = 299792458  # m/s
+
 
 @dataclass(frozen=True)
 class AveragedMechanics(Mechanics):
@@ -73,7 +75,10 @@ class AveragedMechanics(Mechanics):
         e = orbit.eccentricity
         shape = () if orbit.circular else (e, self.scene.context.sqrt(1 - e * e))
         direction, inverse = self._place(orbit).seen(*map(self.number, shape))
-        return OrbitStates(StateBlock([], [], []), direction, self._normal(orbit), inverse)
+        turn = self._turned(orbit.ascending_node + orbit.periapsis, orbit.node_rate + orbit.periapsis_rate)
+        eccentric = self.number(e) * turn[0], self.number(e) * turn[1]
+        normal = self._normal(orbit)
+        return OrbitStates(StateBlock([], [], []), direction, normal, inverse, eccentric=eccentric)
 
     def _place(self, orbit: KeplerOrbit) -> OrbitPlace:
         """Position of a source on its orbit."""
@@ -143,11 +148,12 @@ class AveragedMechanics(Mechanics):
     def derivatives(self) -> list[Symbolic]:
         """Derivatives of the states, per internal unit of time."""
         s = self.direction
+        geodetic = self._geodetic()
         if self.of.over_orbits:
-            return cross(total([self._secular(source) for source in self.of.sources]), s)
+            return cross(total([self._secular(source) for source in self.of.sources] + geodetic), s)
         pull = self._pull(s)
-        if self.of.figure == 0:
-            return cross(pull, s)
+        if self.of.figure == 0 or not self._second:
+            return cross(total([pull, *geodetic]), s)
         # the torque acts on the circled axis, which is offset from the momentum by d = -a s x s'; to second
         # order this gives (G - a G^2 + 2 a (s . G s) G) s x s for a pull G s
         context = self.scene.context
@@ -155,18 +161,44 @@ class AveragedMechanics(Mechanics):
         a = as_factor(self.number(context.ldexp(moment, -self.scaling.time)))
         factor = 1.0 + 2.0 * (a * dot(s, pull))
         bent = [factor * g - a * again for g, again in zip(pull, self._pull(pull), strict=True)]
-        return cross(bent, s)
+        return cross(total([bent, *geodetic]), s)
+
+    @property
+    def _second(self) -> bool:
+        """Whether terms of second order belong to the equations."""
+        return self.scene.config.model.order == 2
+
+    def _geodetic(self) -> list[list[Symbolic]]:
+        """Rates at which space turns along the body's orbits, if asked for, per internal unit of time:
+        3/2 G M n / (c^2 a (1 - e^2)) about the orbit's normal (de Sitter 1916; Misner, Thorne & Wheeler 1973,
+        eq. 40.33).
+        """
+        found = []
+        for source in self.of.sources if self.scene.config.model.geodetic_precession else ():
+            if source.has_elements:
+                context = self.scene.context
+                ellipse = source.ellipse(context, self.scene.start)
+                strength = source.of.gravitational_parameter / source.of.placement.distance(context)
+                size = 3 * strength * ellipse.motion / (2 * _LIGHT**2 * (1 - ellipse.square))
+                where = source.of.table is not None
+                seen = self.table(source.of.table) if where else self.orbit(self.carried(source.of.orbit))
+                factor = as_factor(self.number(size * self.unit))
+                found.append([factor * x for x in seen.normal])
+        return found
 
     def _secular(self, source: Source) -> list[Symbolic]:
         """Secular pull -(k/2) (1 - e^2)^(-3/2) (n . s) n to second order; the pull of a source at rest."""
         context, s = self.scene.context, self.direction
         if source.of.table is not None:
-            return self._by_table[source.of.table].secular(self.of.rate(source) * self.unit, s)
+            rate, table = self.of.rate(source) * self.unit, self._by_table[source.of.table]
+            return table.secular(rate, s, second=self._second)
         if source.of.orbit is None:
             return self._pull_of(source, s)
         normal = self.orbit(source.of.orbit).normal
         size = source.secular_strength(context) * self.of.motion.excess / self.of.motion.momentum
         factor = as_factor(self.number(-size * self.unit)) * dot(normal, s)
+        if not self._second:
+            return [factor * x for x in normal]
         second = self._second_order(source, normal)
         return [factor * x + y for x, y in zip(normal, second, strict=True)]
 

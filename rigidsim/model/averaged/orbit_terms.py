@@ -195,19 +195,23 @@ class TableTerms:
         """Orbit states as where the orbit is resolved; no direction if the position is unknown."""
         at, states = self.place, self.states
         if at is None:
-            return OrbitStates(states.block, [], states.normal, hy.expression(1.0))
+            return OrbitStates(
+                states.block, [], states.normal, hy.expression(1.0), eccentric=states.eccentric
+            )
         direction, inverse = at.seen(self.ellipse.eccentricity, self.ellipse.root)
-        return OrbitStates(states.block, direction, states.normal, inverse / self._value(AXIS))
+        inverse = inverse / self._value(AXIS)
+        return OrbitStates(states.block, direction, states.normal, inverse, eccentric=states.eccentric)
 
-    def secular(self, rate: Any, s: list[Symbolic]) -> list[Symbolic]:
-        """Vector whose product with s is s', to second order; k (mpf) is that at the mean axis."""
+    def secular(self, rate: Any, s: list[Symbolic], *, second: bool) -> list[Symbolic]:
+        """Vector whose product with s is s', to first or second order; k (mpf) is that at the mean axis."""
         normal, ellipse = self.states.normal, self.ellipse
         z = dot(normal, s)
         first = as_factor(self.number(-rate)) * (ellipse.secular_factor * self._cubed * z)
+        if not second:
+            return [first * x for x in normal]
         # (k^2 / 4) c1 (1 - 3 z^2)
         across = ellipse.across * (self._cubed * self._cubed) / ellipse.motion
-        second = as_factor(self.number(rate * rate / 4)) * (across * (3.0 * (z * z) - 1.0))
-        factor = first + second
+        factor = first + as_factor(self.number(rate * rate / 4)) * (across * (3.0 * (z * z) - 1.0))
         return [factor * x for x in normal]
 
     def nutation(self, rate: Any, s: list[Symbolic]) -> list[Symbolic]:

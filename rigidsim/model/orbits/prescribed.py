@@ -60,6 +60,9 @@ class OrbitStates:
     normal: list[Symbolic]  # of the plane; the attracting body moves about it directly
     inverse_distance: Symbolic  # semi-major axis over distance, 1 for a circle
     parts: KeplerParts | None = None  # of a Kepler orbit, from which its motion follows
+    eccentric: tuple[Symbolic, Symbolic] | None = (
+        None  # e cos and e sin of the longitude of periapsis as given
+    )
 
 
 def orbit_states(
@@ -115,7 +118,9 @@ def orbit_states(
     eccentricity, root = rounded(number(e)), rounded(number(context.sqrt(1 - e * e)))
     turns = [(w_c, w_s, uniform(orbit.periapsis_rate)), (n_c, n_s, uniform(orbit.node_rate))]
     parts = KeplerParts(eccentricity, root, motion, (c, s), inverse, turns[0], turns[1], (i_c, i_s))
-    return OrbitStates(StateBlock(names, derivatives, initial, norms), direction, normal, inverse, parts)
+    block = StateBlock(names, derivatives, initial, norms)
+    eccentric = eccentricity * (n_c * w_c - n_s * w_s), eccentricity * (n_s * w_c + n_c * w_s)
+    return OrbitStates(block, direction, normal, inverse, parts, eccentric)
 
 
 # --- tables -------------------------------------------------------------------------------------------------
@@ -175,6 +180,12 @@ class ElementStates:
     motion: Symbolic  # rate of the mean longitude
     pace: Symbolic  # mean motion by Kepler's third law, or by the period that was given
     mean_longitude: Symbolic | None  # rad; None if it isn't carried
+    side: float  # -1 for elements that are the body's own, whose periapsis is half a turn away
+
+    @property
+    def eccentric(self) -> tuple[Symbolic, Symbolic]:
+        """e cos and e sin of the longitude of periapsis as the table gives it."""
+        return self.side * rounded(self.values["k"]), self.side * rounded(self.values["h"])
 
     @property
     def normal(self) -> list[Symbolic]:
@@ -230,7 +241,8 @@ def element_states(
         longitude = number(orbit.starting_longitude(start) % (2 * context.pi)) + math.ldexp(
             1.0, exponent
         ) * hy.make_vars(names[-1])
-    return ElementStates(StateBlock(names, derivatives, initial), values, rates, motion, pace, longitude)
+    block, side = StateBlock(names, derivatives, initial), -1.0 if orbit.opposite else 1.0
+    return ElementStates(block, values, rates, motion, pace, longitude, side)
 
 
 def table_states(
@@ -255,7 +267,7 @@ def table_states(
         [*found.block.initial, context.cos(eccentric), context.sin(eccentric)],
         [hy.sqrt(c * c + s * s)],
     )
-    return OrbitStates(block, direction, found.normal, inverse / axis)
+    return OrbitStates(block, direction, found.normal, inverse / axis, eccentric=found.eccentric)
 
 
 def _unit(orbit: TabulatedOrbit, element: str) -> Any:

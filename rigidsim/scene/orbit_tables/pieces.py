@@ -56,7 +56,7 @@ class TabulatedOrbit:
         self.key, self.name, self.table, self.motion = key, name, table, motion
         self.context = table.context
         self._constants = constants
-        self._half_turn = self.context.pi if opposite else self.context.zero
+        self.opposite, self._half_turn = opposite, self.context.pi if opposite else self.context.zero
         self._rows = self._regular()
         moving = [name for name, values in self._rows.items() if isinstance(values, list)]
         self.moving: tuple[str, ...] = tuple(moving)
