@@ -6,7 +6,7 @@ import xarray
 
 pytest.importorskip("matplotlib")
 
-from rigidsim.look.figures.sweep_maps import drawable, sweep_figure
+from rigidsim.look.figures.sweeps import drawable, sweep_figure
 
 
 def secular(unit: str = "yr") -> xarray.Dataset:

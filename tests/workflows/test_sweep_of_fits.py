@@ -9,7 +9,7 @@ import pytest
 
 import rigidsim
 from rigidsim.errors import RigidsimError
-from rigidsim.look.figures.sweep_maps import sweep_figure
+from rigidsim.look.figures.sweeps import sweep_figure
 from rigidsim.store.sweeps.run import open_sweep
 from rigidsim.workflows.sweeps.members import single_member
 from rigidsim.workflows.sweeps.sweep import resume_sweep

@@ -13,7 +13,7 @@ from rigidsim.formats.registry import Naming
 from rigidsim.look.figure_names import OVERVIEW, SPECTRUM
 from rigidsim.look.figures import available, check_name, figure_format, save_figure
 from rigidsim.look.figures.spectrum import save_spectrum
-from rigidsim.look.figures.sweep_maps import drawable, save_sweep_figure
+from rigidsim.look.figures.sweeps import drawable, save_sweep_figure
 from rigidsim.store.outputs import ANALYSIS, refuse_loss, writing
 from rigidsim.store.run import SavedRun, ShownRun, open_run
 from rigidsim.store.sweeps.folder import is_sweep

@@ -12,8 +12,8 @@ panels (``panels.Panel``: what it finds in a dataset, and how that is drawn).
 | `eye` | bodies in three dimensions on plain axes |
 | `slides` | one panel in large letters, on a light or a dark ground |
 | `style` | colours, fonts, the page's heading, keys |
-| `spectrum`, `work_precision`, `sweep_maps`, `sweep_axes` | figures of `analyse`, `tradeoff` and `sweep` |
-| `fitted`, `fitted_members` | figures of a fit, and of a sweep of fits |
+| `spectrum`, `work_precision`, `sweeps` | figures of `analyse`, `tradeoff` and `sweep` |
+| `fitted` | the figure of a fit |
 """
 
 from rigidsim.look.figure_names import FIGURES, OVERVIEW

@@ -93,11 +93,6 @@ class Trail:
             return _stride_of(self.points - self.whole.mean(axis=0), _SMOOTH)
         return -(-len(self.points) // SCENE_ROWS)
 
-    @property
-    def fades(self) -> bool:
-        """Whether it has a darker older part; a long trail of a fast motion is heavy enough without."""
-        return self.line and not self.lasting and (self.stride > 1 or len(self.points) <= SCENE_ROWS)
-
 
 @dataclass(frozen=True)
 class Line:

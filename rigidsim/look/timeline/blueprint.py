@@ -12,11 +12,10 @@ from rigidsim.look.plots import Plot
 from rigidsim.look.stages.bodies import camera
 from rigidsim.look.stages.parts import Color, Stage
 from rigidsim.look.timeline import plotting
-from rigidsim.look.timeline.drawing import OLDER, trail_path
+from rigidsim.look.timeline.drawing import trail_path
 from rigidsim.look.timeline.drawn import Clock, DrawnRun
 
-TRAIL_ROWS = 1500  # at most in a sliding trail, and never more than a fifth of the run
-RECENT = 0.3  # of a sliding trail: its bright part
+TRAIL_ROWS = 450  # at most in the bright end of a trail, and never more than a tenth of the run
 PIXELS = 800.0  # about the height of the page
 _DARK = (18, 20, 26)
 PARTS = ("page", "scene", "plots")
@@ -179,16 +178,11 @@ def time_panel(clock: Clock, screen: float, *, following: bool) -> rrb.TimePanel
 def space_view(stage: Stage, run: DrawnRun, *, narrow: bool, titled: bool = True) -> rrb.Spatial3DView:
     """A view of one stage of a run."""
     eye = camera(stage, narrow=narrow, subject=run.subject)
-    rows = max(min(TRAIL_ROWS, len(run.steps) // 5), 2)
+    rows = max(min(TRAIL_ROWS, len(run.steps) // 10), 2)
     overrides: dict[Any, Any] = {}
     for trail in stage.trails:
         path = trail_path(stage, trail)
-        shown = trail.lasting or (round(RECENT * rows) if trail.fades else rows)
-        overrides[f"{path}/recent"] = rrb.VisibleTimeRanges(_window(run.clock, shown))
-        if trail.fades:
-            # A piece of the older part ends where its row is: it must not stand out over the bright one.
-            longest = max(rows, 2 * OLDER * trail.stride)
-            overrides[f"{path}/older"] = rrb.VisibleTimeRanges(_window(run.clock, longest))
+        overrides[f"{path}/recent"] = rrb.VisibleTimeRanges(_window(run.clock, trail.lasting or rows))
     origin = f"/{stage.root}/{stage.looked_from}" if stage.looked_from else f"/{stage.root}"
     return rrb.Spatial3DView(
         origin=origin,

@@ -18,7 +18,7 @@ from rigidsim.look.timeline.drawn import Clock, DrawnRun, build_clock, dated
 from rigidsim.look.timeline.writing import chunks, recording_to
 from rigidsim.scene.parts_of_values import in_time_order
 from rigidsim.scene.readable import epoch_of
-from rigidsim.scene.row_rotations import angles_between
+from rigidsim.scene.row_rotations import angles_between, normalised
 
 MOST = 6  # largest number of runs shown side by side
 ROWS = 20_000  # largest number of rows shown of each run
@@ -105,7 +105,7 @@ def _shade(color: Color, number: int) -> Color:
 
 def attitude_differences(named: Sequence[tuple[str, xarray.Dataset]]) -> Plot | None:
     """The angle (rad) between the first run's attitude and each other's, at the first run's times,
-    where quaternions are interpolated on the arc. None if the first has no attitude, or no other has one
+    where quaternions are interpolated on the chord. None if the first has no attitude, or no other has one
     then.
     """
     (_, first), *others = named
@@ -113,7 +113,7 @@ def attitude_differences(named: Sequence[tuple[str, xarray.Dataset]]) -> Plot | 
     if base is None:
         return None
     times = np.asarray(first["time"].values, dtype=np.float64)
-    base = base / np.linalg.norm(base, axis=1, keepdims=True)
+    base = normalised(base)
     labels, columns = [], []
     for name, table in others:
         quaternion = values(table, "quaternion")
@@ -132,21 +132,8 @@ def attitude_differences(named: Sequence[tuple[str, xarray.Dataset]]) -> Plot | 
 
 
 def _at(times: Array, theirs: Array, quaternion: Array) -> Array:
-    """Unit quaternions at given times: as sampled, on the arc between two samples, nan elsewhere."""
-    unit = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
-    after = np.clip(np.searchsorted(theirs, times), 0, len(theirs) - 1)
-    exact = theirs[after] == times
-    before = np.maximum(after - 1, 0)
-    width = theirs[after] - theirs[before]
-    share = np.where(width > 0, (times - theirs[before]) / np.where(width > 0, width, 1.0), 0.0)
-    a, b = unit[before], unit[after]
-    b = b * np.where(np.einsum("ij,ij->i", a, b) < 0, -1.0, 1.0)[:, None]
-    arc = np.arccos(np.clip(np.einsum("ij,ij->i", a, b), -1.0, 1.0))
-    sine = np.sin(arc)
-    small = sine < 1e-9
-    left = np.where(small, 1 - share, np.sin((1 - share) * arc) / np.where(small, 1.0, sine))
-    right = np.where(small, share, np.sin(share * arc) / np.where(small, 1.0, sine))
-    found = left[:, None] * a + right[:, None] * b
-    found = np.where(exact[:, None], unit[after], found)
-    outside = (times < theirs[0]) | (times > theirs[-1])
-    return np.asarray(np.where(outside[:, None], np.nan, found))
+    """Unit quaternions at given times: as sampled, on the chord between two samples, nan elsewhere."""
+    changes = np.einsum("ij,ij->i", quaternion[1:], quaternion[:-1]) < 0
+    steady = quaternion * np.append(1.0, np.cumprod(np.where(changes, -1.0, 1.0)))[:, None]
+    columns = [np.interp(times, theirs, column, left=np.nan, right=np.nan) for column in steady.T]
+    return normalised(np.stack(columns, axis=1))

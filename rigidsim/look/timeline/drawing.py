@@ -18,12 +18,11 @@ from rigidsim.look.symbols import graticule, sharp_edges
 
 Columns = Iterable[rr.ComponentColumn]
 
-OLDER = 16  # rows in one piece of a trail's older part
 _STRETCH = 25.0  # of a frame along the line of sight: perspective is a 25th of what it was
 _EDGE: Color = (12, 14, 20)
 _AXIS_COLORS = [(235, 70, 60), (90, 200, 90), (80, 130, 250)]
 _CLEAR = 46  # of 255: of a cone, through which labels are read
-_FADED, _DIM = 0.5, 0.26  # of a trail's brightness: its older part, and the whole curve
+_DIM = 0.26  # of a trail's brightness: the whole curve
 
 
 def trail_path(stage: Stage, trail: Trail) -> str:
@@ -152,7 +151,7 @@ def _draw_label(
 
 
 def _draw_trail_static(recording: rr.RecordingStream, path: str, trail: Trail) -> None:
-    dark, faded = (_dimmed(trail.color, part) for part in (_DIM, _FADED))
+    dark = tuple(round(_DIM * x + (1 - _DIM) * 20) for x in trail.color)
     if len(trail.whole) > 1 and not trail.lasting:
         whole = (
             rr.LineStrips3D([trail.whole], colors=[dark], radii=rr.Radius.ui_points(0.8))
@@ -160,14 +159,11 @@ def _draw_trail_static(recording: rr.RecordingStream, path: str, trail: Trail) -
             else rr.Points3D(trail.whole, colors=[dark], radii=rr.Radius.ui_points(1.0))
         )
         recording.log(f"{path}/whole", whole, static=True)
-    styles: list[tuple[str, Any, Color, float]] = [("recent", rr.Points3D, trail.color, 2.0)]
-    if trail.line:
-        lines = rr.LineStrips3D
-        styles = [("older", lines, faded, 1.2), ("recent", lines, trail.color, 1.8)]
+    styles: list[tuple[str, Any, float]] = [("recent", rr.LineStrips3D if trail.line else rr.Points3D, 1.8)]
     if trail.head:
-        styles.append(("head", rr.Points3D, trail.color, 4.5))
-    for name, kind, color, size in styles:
-        style = kind.from_fields(colors=[color], radii=rr.Radius.ui_points(size))
+        styles.append(("head", rr.Points3D, 4.5))
+    for name, kind, size in styles:
+        style = kind.from_fields(colors=[trail.color], radii=rr.Radius.ui_points(size))
         recording.log(f"{path}/{name}", style, static=True)
 
 
@@ -195,11 +191,6 @@ def _cone_columns(cone: Cone, path: str, rows: slice) -> Iterable[tuple[str, sli
     closed = np.concatenate([rims, rims[:, :, :1]], axis=2).reshape(count * sides, corners + 1, 3)
     edges = rr.LineStrips3D.columns(strips=list(closed))
     yield f"{path}/rim", rows, edges.partition([sides] * count)
-
-
-def _dimmed(color: Color, part: float) -> tuple[int, int, int]:
-    red, green, blue = (round(part * x + (1 - part) * 20) for x in color)
-    return red, green, blue
 
 
 def stage_columns(stage: Stage, rows: slice) -> Iterable[tuple[str, slice, Columns]]:
@@ -232,7 +223,7 @@ def stage_columns(stage: Stage, rows: slice) -> Iterable[tuple[str, slice, Colum
         yield _arrow_path(stage, arrow), picked, columns
     for trail in stage.trails:
         path, stride = trail_path(stage, trail), trail.stride
-        picked, older = _every(rows, stride), _every(rows, OLDER * stride)
+        picked = _every(rows, stride)
         if trail.head:
             head = trail.points[rows].astype(np.float32)
             yield f"{path}/head", rows, rr.Points3D.columns(positions=head)
@@ -240,12 +231,8 @@ def stage_columns(stage: Stage, rows: slice) -> Iterable[tuple[str, slice, Colum
             points = trail.points[picked].astype(np.float32)
             yield f"{path}/recent", picked, rr.Points3D.columns(positions=points)
             continue
-        strips = _pieces(trail.points, picked, stride, 1)
+        strips = _pieces(trail.points, picked, stride)
         yield f"{path}/recent", picked, rr.LineStrips3D.columns(strips=strips)
-        if trail.fades and older.start < rows.stop:
-            strips = _pieces(trail.points, older, stride, OLDER)
-            yield f"{path}/older", older, rr.LineStrips3D.columns(strips=strips)
-
     for cone in stage.cones:
         yield from _cone_columns(cone, _cone_path(stage, cone), rows)
 
@@ -254,13 +241,12 @@ def _every(rows: slice, stride: int) -> slice:
     return slice(-(-rows.start // stride) * stride, rows.stop, stride)
 
 
-def _pieces(points: Array, rows: slice, stride: int, length: int) -> pa.Array:
-    """For each row, a strip of `length` + 1 points up to it, `stride` rows apart; built at once in Arrow."""
+def _pieces(points: Array, rows: slice, stride: int) -> pa.Array:
+    """For each row, a strip from the point `stride` rows before; built at once in Arrow."""
     ends = np.arange(rows.start, rows.stop, rows.step or 1)
-    places = np.maximum(ends[:, None] - stride * np.arange(length, -1, -1), 0)
-    flat = points[places].astype(np.float32).ravel()
+    flat = points[np.maximum(ends[:, None] - [stride, 0], 0)].astype(np.float32).ravel()
     kind = rr.components.LineStrip3DBatch._ARROW_DATATYPE
-    offsets = pa.array(np.arange(len(ends) + 1, dtype=np.int32) * (length + 1))
+    offsets = pa.array(np.arange(len(ends) + 1, dtype=np.int32) * 2)
     inner = pa.FixedSizeListArray.from_arrays(pa.array(flat), type=kind.value_type)
     return pa.ListArray.from_arrays(offsets, inner, type=kind)
 

@@ -1,0 +1,436 @@
+"""Figures of a sweep: lines along an axis, a map over two or over a sphere, points of a section, fits.
+
+What is drawn is a variable of the dataset: one number of each member. A vector has a line for each component,
+or the map of one of them; of two axes one with few values has a line for each. Where the members have more
+axes than two, the others are cut at their first value, and the page says so.
+"""
+
+import math
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+import xarray
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+
+from rigidsim.look.figures.style import GREY, INK, PALE, PALETTE, STYLE, blank, key, titled
+from rigidsim.look.record import read_config
+from rigidsim.look.solids import Array
+from rigidsim.look.units import pretty_unit, scaled, with_unit
+
+INDICATORS = ("megno", "fli", "lyapunov")
+_ALWAYS = (
+    *("status", "warnings", "steps", "time_reached", "drift_bound", "attitude_error", "position_error"),
+    *("modelling_error", "modelling_error_norm", "modelling_error_energy"),
+)
+_BESIDE = ("failed_member", "failed_reason")
+_LAST = ("_drift_largest", "_drift_final", "_time", "_times", "_count")
+_SECTION = "_occurrence"  # dimension of the points of a section
+_NO_RESULT = 30  # rank from which on nothing is a result
+_MOST_LINES = 16
+_FEW = 6  # values of a second axis up to which each has a line, and there is no map
+_MANY = 400  # values of which a few may lie beyond the colours
+_MOST_POINTS = 400_000
+_FILLED = 2.0  # area of a sphere's dots over that of its map
+_STILL = 1e-9  # variation between members or components, relative to the largest, that is rounding
+_NOISE = 1e-12  # of a signal's own size, below which a line or a secular rate is rounding
+_MOST_TOLD, _CROWDED, _LONGEST = 12, 60, 24  # values told at their ticks, their letters, and letters of one
+_DECADES = 1.5  # from which on values of one sign have a logarithmic scale
+_FEWEST = 12  # directions that make a map
+_MOST_PANELS, _COLUMNS, _PANEL = 14, 2, 1.75  # of fits; inches high
+_APART = 0.012  # of the axis, between members of different colours
+
+
+@dataclass(frozen=True)
+class Axis:
+    """An axis of the members: places (n,) of its values, its label, texts of the values where they are only
+    numbered, and whether neighbours are related, which randomly drawn members aren't.
+    """
+
+    dim: str
+    place: Array
+    label: str
+    texts: list[str]
+    numbered: bool
+    ordered: bool
+    directions: Array | None
+
+    @classmethod
+    def of(cls, dataset: xarray.Dataset, dim: str) -> "Axis":
+        """That of a dimension."""
+        words, count = dim.replace("_", " "), dataset.sizes[dim]
+        values = next((dataset[name] for name in (f"{dim}_value", dim) if name in dataset.coords), None)
+        zipped = [c for c in dataset.coords.values() if c.dims == (dim,) and "swept_key" in c.attrs]
+        numbers = [c for c in (values, *zipped) if c is not None and c.ndim == 1 and c.dtype.kind in "fi"]
+        texts = [] if values is None else [_text(value) for value in values.values]
+        directions = None
+        if values is not None and values.shape[1:] == (3,) and count >= _FEWEST:
+            lengths = np.linalg.norm(values.values, axis=1)
+            if lengths.min() > 0 and np.ptp(lengths) <= _STILL * lengths.max():
+                directions = values.values / lengths[:, None]
+        if not numbers:
+            told = values is not None and count <= _MOST_TOLD
+            label = _named(values) if told and values is not None else f"{words}, counted from 0"
+            return cls(dim, np.arange(float(count)), label, texts, True, False, directions)
+        divisor, unit = _unit_of(dataset, numbers[0])
+        place = np.asarray(numbers[0].values, dtype=np.float64) / divisor
+        rises = np.diff(place) > 0
+        along = str(numbers[0].name) == dim or bool(rises.all() or not rises.any())
+        texts = [f"{words} {x:.4g}" for x in place]
+        return cls(dim, place, _named(numbers[0], unit), texts, False, along, directions)
+
+    @property
+    def log(self) -> bool:
+        """Whether its values span decades at equal ratios."""
+        if self.numbered or not spans_decades(self.place):
+            return False
+        ratios = np.diff(np.log(np.unique(self.place)))
+        return len(ratios) < 2 or float(np.ptp(ratios)) < 0.01 * float(ratios.mean())
+
+    def show(self, axes: Axes, which: str = "x") -> None:
+        """Label an axis; ticks of numbered values have these, if they are few."""
+        axes.set(**{f"{which}label": self.label}, **({f"{which}scale": "log"} if self.log else {}))
+        few = self.numbered and len(self.place) <= _MOST_TOLD and any(self.texts)
+        if few:
+            turned = {"rotation": 25, "ha": "right"} if sum(map(len, self.texts)) > _CROWDED else {}
+            getattr(axes, f"set_{which}ticks")(self.place, self.texts, **(turned if which == "x" else {}))
+
+
+def _text(value: Any) -> str:
+    if np.ndim(value):
+        return f"[{', '.join(format(float(x), '.4g') for x in value)}]"
+    text = format(float(value), ".4g") if np.asarray(value).dtype.kind in "fi" else str(value)
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
+
+
+def _named(variable: xarray.DataArray, unit: str | None = None) -> str:
+    """A variable's name and unit; for a sweep's axis also its key."""
+    words, swept = str(variable.name).replace("_", " "), str(variable.attrs.get("swept_key", ""))
+    if swept and swept != variable.name:
+        words += f" ({swept})"
+    return with_unit(words, pretty_unit(str(variable.attrs.get("units", ""))) if unit is None else unit)
+
+
+def _unit_of(dataset: xarray.Dataset, variable: xarray.DataArray) -> tuple[float, str]:
+    """Divisor and name of a unit that suits the scene."""
+    asked = read_config(dataset).get("time", {}).get("unit") or dataset.attrs.get("time_unit")
+    plain = pretty_unit(str(variable.attrs.get("units", "")))
+    if variable.dtype.kind != "f" or (plain not in ("s", "rad") and not (plain == "rad/s" and asked)):
+        return 1.0, plain
+    return scaled(np.asarray(variable.values), plain, {"time_unit": asked})
+
+
+def _members(dataset: xarray.Dataset) -> list[str]:
+    return [str(dim) for dim in dataset["status"].dims]
+
+
+def drawable(dataset: xarray.Dataset) -> list[str]:
+    """Names that a sweep's figure can show, the default first."""
+    found = [
+        str(name)
+        for name, variable in dataset.data_vars.items()
+        if set(_members(dataset)) <= set(variable.dims)
+        and variable.dtype.kind in "fi"
+        and not {"time", "sample"} & set(variable.dims)
+        and name not in _BESIDE
+    ]
+    return sorted(found, key=lambda name: (_rank(dataset, name), found.index(name)))
+
+
+def default_of(dataset: xarray.Dataset) -> str:
+    """What a sweep's figure shows where nothing is named: the first result that tells its members apart, no
+    conserved quantity and no rounding; the members' status where nothing does.
+    """
+    results = (name for name in drawable(dataset) if _rank(dataset, name) < _NO_RESULT)
+    return next((name for name in results if not _tells_nothing(dataset, name)), "status")
+
+
+def _rank(dataset: xarray.Dataset, name: str) -> int:
+    attributes, dims = dataset[name].attrs, dataset[name].dims
+    words = str(attributes.get("long_name", ""))
+    conserved = {str(v.attrs["drift_of"]) for v in dataset.data_vars.values() if "drift_of" in v.attrs}
+    ranks = {
+        0: name in INDICATORS,
+        5: name.endswith("_first") and f"{name[:-6]}_count" in dataset,  # when an event happened
+        _NO_RESULT: name in _ALWAYS,
+        _NO_RESULT + 1: "drift_of" in attributes or any(name.startswith(f"{one}_") for one in conserved),
+        12: any(str(dim).endswith(_SECTION) for dim in dims),
+        8: words.startswith("secular rate"),
+        14: " of the lines of " in words,
+        20: name.endswith(_LAST),
+    }
+    return next((rank for rank, holds in ranks.items() if holds), 10)
+
+
+def _tells_nothing(dataset: xarray.Dataset, name: str) -> bool:
+    """Whether a variable is the same in all members but for rounding, or rounding itself: a line or a secular
+    rate that is too small beside the signal that it was found in.
+    """
+    variable, dims = dataset[name], _members(dataset)
+    others = [dim for dim in variable.dims if dim not in dims]
+    with np.errstate(invalid="ignore"):
+        spread, size = variable.max(dims) - variable.min(dims), float(np.abs(variable).max())
+    if variable.sizes[dims[0]] < 2 or not np.isfinite(size):
+        return False
+    if float(spread.max(others)) <= _STILL * size:
+        return True
+    signal, _, what = name.rpartition("_")
+    if what not in ("amplitude", "rate"):
+        return False
+    over = float(dataset["time_reached"].max()) if what == "rate" and "time_reached" in dataset else 1.0
+    scale = float(np.abs(dataset[f"{signal}_amplitude"]).max()) if f"{signal}_amplitude" in dataset else 0.0
+    radians = str(variable.attrs.get("units", "")).startswith("rad")
+    return size * over <= _NOISE * max(scale, float(radians))
+
+
+def save_sweep_figure(dataset: xarray.Dataset, path: Any, what: str | None, *, file_format: str) -> None:
+    """Draw a sweep's figure to a file; see ``sweep_figure``."""
+    with rc_context(STYLE):  # type: ignore[arg-type]
+        sweep_figure(dataset, what).savefig(path, dpi=160, format=file_format)
+
+
+def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
+    """A sweep's page: one variable over its axes, by its name, with ``[INDEX]`` for one component; by default
+    the first indicator, else the first time of an event, else a secular rate, else the first quantity kept
+    that isn't the same in all members; of fits what they estimated. Times are in the scene's unit, angles in
+    a readable one.
+    ``ValueError`` names the variables there are where there is none of that name.
+    """
+    with rc_context(STYLE):  # type: ignore[arg-type]
+        if what is None and {"value", "sigma", "converged"} <= set(dataset.data_vars):
+            return _fits(dataset)
+        names = drawable(dataset)
+        name, bracket, index = (what or default_of(dataset)).partition("[")
+        if name not in names or (bracket and not index.removesuffix("]").isdigit()):
+            raise ValueError(
+                f"{what!r} is nothing that this sweep kept; allowed: {', '.join(names)}, of a vector "
+                "with [0], [1] ... for one component"
+            )
+        divisor, unit = _unit_of(dataset, dataset[name])
+        variable = (dataset[name] / divisor).assign_attrs({**dataset[name].attrs, "units": unit})
+        members = [Axis.of(dataset, dim) for dim in _members(dataset)]
+        if any(str(dim).endswith(_SECTION) for dim in variable.dims):
+            return _points(dataset, variable, members)
+        kept, variable, said = _cut(variable, members)
+        extra = {str(dim): variable.sizes[dim] for dim in variable.dims if dim not in [a.dim for a in kept]}
+        sizes = [len(axis.place) for axis in kept]
+        lines = len(kept) == 1 or min(sizes) <= _FEW < max(sizes)
+        if bracket or (extra and (not lines or len(kept) > 1 or kept[0].directions is not None)):
+            number = int(index.removesuffix("]") or 0)
+            if number >= math.prod(extra.values()):
+                raise ValueError(
+                    f"{name} has the components 0 to {math.prod(extra.values()) - 1}, given {number}"
+                )
+            place = (
+                dict(zip(extra, np.unravel_index(number, [*extra.values()]), strict=True)) if extra else {}
+            )
+            variable = variable.isel({dim: int(k) for dim, k in place.items()})
+            said += [f"{dim.replace('_', ' ')} {_label(dataset, dim, int(k))}" for dim, k in place.items()]
+        title = "; ".join([_title(variable), *([", ".join(said)] if said else [])])
+        if len(kept) == 1 and kept[0].directions is not None:
+            return _sphere(dataset, variable, kept[0].directions, title)
+        draw = _lines if lines else _map
+        return draw(dataset, variable, sorted(kept, key=lambda a: -len(a.place)) if lines else kept, title)
+
+
+def _cut(variable: xarray.DataArray, members: list[Axis]) -> tuple[list[Axis], xarray.DataArray, list[str]]:
+    """At most two axes of more than one value, the longest; others are cut at their first value."""
+    longest = sorted(members, key=lambda axis: -len(axis.place))[:2]
+    kept = [axis for axis in members if axis in longest and len(axis.place) > 1] or members[:1]
+    cut = [axis for axis in members if axis not in kept]
+    said = [axis.texts[0] if axis.texts else f"{axis.dim.replace('_', ' ')} 0" for axis in cut]
+    return kept, variable.isel({axis.dim: 0 for axis in cut}), said
+
+
+def _label(dataset: xarray.Dataset, dim: str, place: int) -> str:
+    """Label of one place along a dimension, as the component x of a vector."""
+    return _text(dataset[dim].values[place]) if dim in dataset.coords else str(place)
+
+
+def _lines(dataset: xarray.Dataset, variable: xarray.DataArray, kept: list[Axis], title: str) -> Figure:
+    """Values over one axis, with a line for each component, or value of another axis."""
+    figure, (axis, *others) = blank(dataset, 9.0, 4.4), kept
+    axes = figure.add_subplot()
+    rest = [str(dim) for dim in variable.dims if dim != axis.dim]
+    texts = {other.dim: other.texts for other in others}
+    named = [texts.get(d) or [_label(dataset, d, k) for k in range(variable.sizes[d])] for d in rest]
+    labels = [" ".join(parts) for parts in product(*named)]
+    order = np.argsort(axis.place, kind="stable")
+    table = np.asarray(variable.transpose(axis.dim, *rest).values, dtype=np.float64).reshape(len(order), -1)
+    marks = {"marker": "o", "ms": 3.2} if len(order) <= 100 or not axis.ordered else {}
+    for column, label, color in zip(table.T[:_MOST_LINES], labels, PALETTE * 2, strict=False):
+        told = {"label": label if len(labels) > 1 else None, "color": color, "lw": 1.4 if axis.ordered else 0}
+        axes.plot(axis.place[order], column[order], **told, **marks)
+    more = f" (the first {_MOST_LINES} of {len(labels)})" if len(labels) > _MOST_LINES else ""
+    key(axes, title + more)
+    axis.show(axes)
+    axes.set(ylabel=_named(variable), **({"yscale": "log"} if spans_decades(table) else {}))
+    axes.yaxis.set_offset_position("right")  # the key is on the left
+    return figure
+
+
+def _map(dataset: xarray.Dataset, variable: xarray.DataArray, kept: list[Axis], title: str) -> Figure:
+    """Values over two axes, as colours."""
+    figure = blank(dataset, 8.4, 6.0)
+    axes = figure.add_subplot(facecolor=PALE)
+    for axis, which in zip(kept, "xy", strict=True):
+        variable = variable.drop_vars(axis.dim, errors="ignore").assign_coords({axis.dim: axis.place})
+        variable = variable.sortby(axis.dim)
+        axis.show(axes, which)
+    missing = "" if np.isfinite(variable).all() else " (grey: no value)"
+    scale = _colours(np.asarray(variable.values, dtype=np.float64))
+    bar = {"label": _named(variable), "pad": 0.02, "aspect": 30}
+    options: dict[str, Any] = {"cmap": "viridis", "rasterized": True, "cbar_kwargs": bar}
+    variable.plot.pcolormesh(x=kept[0].dim, y=kept[1].dim, ax=axes, add_labels=False, **options, **scale)
+    axes.grid(visible=False)
+    titled(axes, title + missing)
+    return figure
+
+
+def _colours(values: Array) -> dict[str, Any]:
+    """Scale of a map's colours, logarithmic if values span decades, and the ends beyond which some lie: of
+    many, a hundredth of the values at the ends doesn't take the colours from all others.
+    """
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return {"vmin": 0.0, "vmax": 1.0, "extend": "neither"}
+    ends = [0.5, 99.5] if len(finite) >= _MANY else [0, 100]
+    decades = spans_decades(values)
+    low, high = np.percentile(finite[finite > 0] if decades else finite, ends)
+    if not decades and (high - low < 0.5 * np.ptp(finite) or low == high):  # few different values
+        low, high = finite.min(), finite.max()
+        high = high if high > low else low + 1.0
+    beyond = bool((finite < low).any()), bool((finite > high).any())
+    extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(beyond, "neither")
+    return {"extend": extend} | ({"norm": LogNorm(low, high)} if decades else {"vmin": low, "vmax": high})
+
+
+def _sphere(dataset: xarray.Dataset, variable: xarray.DataArray, ways: Array, title: str) -> Figure:
+    """A Mollweide map, +z at the top and +x in the centre, with a dot for each direction, (members, 3)."""
+    figure = blank(dataset, 8.4, 4.8)
+    scale = _colours(np.asarray(variable.values, dtype=np.float64))
+    extend = scale.pop("extend")
+    axes = figure.add_subplot(projection="mollweide", facecolor=PALE)
+    longitude, latitude = np.arctan2(ways[:, 1], ways[:, 0]), np.arcsin(np.clip(ways[:, 2], -1, 1))
+    figure.canvas.draw()  # the layout says how large the map is
+    box = axes.get_window_extent()
+    area = np.pi / 4 * box.width * box.height * (72 / figure.dpi) ** 2  # of the ellipse, square points
+    options: dict[str, Any] = {
+        "s": _FILLED * area / len(ways),
+        "lw": 0,
+        "cmap": "viridis",
+        "rasterized": True,
+    }
+    shown = axes.scatter(longitude, latitude, c=variable.values, **options, **scale)
+    places = {"+x": (0, 0), "+y": (np.pi / 2, 0), "−y": (-np.pi / 2, 0), "+z": (0, 1.35), "−z": (0, -1.35)}
+    ground = {"boxstyle": "round,pad=0.2", "facecolor": "white", "alpha": 0.7, "linewidth": 0}
+    for name, place in places.items():
+        axes.annotate(name, place, ha="center", va="center", fontsize=8, bbox=ground)
+    axes.set(xticklabels=[], yticklabels=[])
+    axes.grid(visible=False)
+    titled(axes, title)
+    figure.colorbar(shown, ax=axes, label=_named(variable), pad=0.02, aspect=30, shrink=0.7, extend=extend)
+    return figure
+
+
+def _points(dataset: xarray.Dataset, variable: xarray.DataArray, members: list[Axis]) -> Figure:
+    """A section's points of all members: one component against the other, or the axis of the members."""
+    dims = [axis.dim for axis in members]
+    (occurrence,) = [str(dim) for dim in variable.dims if str(dim).endswith(_SECTION)]
+    rest = [str(dim) for dim in variable.dims if dim not in (*dims, occurrence)]
+    whole = np.asarray(variable.transpose(*dims, occurrence, *rest).values, dtype=np.float64)
+    table = whole.reshape(math.prod(variable.sizes[dim] for dim in dims), variable.sizes[occurrence], -1)
+    stride = max(1, -(-table[..., 0].size // _MOST_POINTS))
+    which = np.repeat(np.arange(len(table)), table.shape[1])[::stride]
+    rows = table.reshape(-1, table.shape[2])[::stride]
+    style: dict[str, Any] = {"s": 2.5, "lw": 0, "rasterized": True}
+    figure = blank(dataset, 8.4, 6.0)
+    axes = figure.add_subplot()
+    if rows.shape[1] > 1:
+        # the first two components that vary: what the section is cut at doesn't, but for rounding
+        known = rows[np.isfinite(rows).all(axis=1)]
+        spread = np.ptp(known, axis=0) if len(known) else np.ones(rows.shape[1])
+        order = np.argsort(spread <= _STILL * np.abs(known).max(initial=0), kind="stable")
+        one, other = sorted(order[:2].tolist())
+        first, second = (_label(dataset, rest[0], k) if len(rest) == 1 else str(k) for k in (one, other))
+        axes.scatter(rows[:, one], rows[:, other], c=which, cmap="viridis", **style)
+        axes.set(xlabel=f"{_named(variable)}, {first}", ylabel=f"{_named(variable)}, {second}")
+        titled(axes, f"{_title(variable)}; coloured by member")
+        return figure
+    place = members[0].place if len(members) == 1 else np.arange(len(table))
+    axes.scatter(place[which], rows[:, 0], color=GREY, **style)
+    axes.set(xlabel=members[0].label if len(members) == 1 else "member", ylabel=_named(variable))
+    titled(axes, _title(variable))
+    return figure
+
+
+def _title(variable: xarray.DataArray) -> str:
+    title = str(variable.attrs.get("long_name") or variable.name).replace("_", " ")
+    return title[:1].upper() + title[1:]
+
+
+def spans_decades(values: Array) -> bool:
+    """Whether values are better shown on a logarithmic scale."""
+    finite = values[np.isfinite(values)]
+    if not len(finite) or finite.min() <= 0:
+        return False
+    low, high = np.percentile(finite, [2, 98])
+    return bool(math.log10(finite.max() / finite.min()) > 1 and math.log10(high / low) > _DECADES)
+
+
+def _fits(dataset: xarray.Dataset) -> Figure:
+    """A panel for each parameter: estimates with bars of one sigma over the longest axis, in colours by a
+    second one; dashed where all fits began, hollow without sigma, crosses where a fit didn't converge. The
+    last panel has the residuals in their sigmas.
+    """
+    longest = sorted((Axis.of(dataset, dim) for dim in _members(dataset)), key=lambda axis: -len(axis.place))
+    axis, second = longest[0], [one for one in longest[1:2] if 1 < len(one.place) <= _FEW]
+    beyond = longest[1 + len(second) :]
+    cut = dataset.isel({one.dim: 0 for one in beyond})
+    count = min(cut.sizes["parameter"], _MOST_PANELS - 1)
+    rows = math.ceil((count + 1) / _COLUMNS)
+    figure = blank(dataset, 11.0, _PANEL * rows + 1.2)
+    panels = np.ravel(figure.subplots(rows, _COLUMNS, squeeze=False))
+    for n, axes in enumerate(panels[: count + 1]):
+        one = cut.isel(parameter=min(n, count - 1))
+        fitted = n < count
+        start = one["start"].values[np.isfinite(one["start"].values)]
+        if fitted and len(start) and np.ptp(start) <= _NOISE * np.abs(start).max():
+            axes.axhline(float(start[0]), color=GREY, lw=1.0, ls="--", label="start")
+        elif not fitted:
+            axes.axhline(1.0, color=GREY, lw=1.0, ls="--")
+        _estimates(axes, one, axis, second, "value" if fitted else "scale")
+        unit = pretty_unit(str(one["parameter_unit"].values)) if fitted else "in sigmas"
+        title = (
+            str(one["parameter"].values)
+            if fitted
+            else "; ".join(["Residuals", *(x.texts[0] for x in beyond)])
+        )
+        (titled if n else key)(axes, title)
+        axis.show(axes)
+        axes.set_ylabel("" if unit == "1" else unit)
+        lowest = n + _COLUMNS > count
+        axes.tick_params(labelbottom=lowest)
+        axes.set_xlabel(axis.label if lowest else "")
+    for empty in panels[count + 1 :]:
+        empty.set_visible(False)
+    return figure
+
+
+def _estimates(axes: Axes, one: xarray.Dataset, axis: Axis, second: list[Axis], name: str) -> None:
+    count = len(second[0].place) if second else 1
+    width = _APART * (float(np.ptp(axis.place)) or 1.0) if count > 1 and not axis.log else 0.0
+    for n, color in zip(range(count), PALETTE, strict=False):
+        here = one.isel({second[0].dim: n}) if second else one
+        value, good = here[name].values, here["converged"].values == 1
+        sigma = here["sigma"].values if name == "value" else np.zeros(len(value))
+        at, known = axis.place + width * (n - (count - 1) / 2), good & np.isfinite(sigma)
+        label = second[0].texts[n] if second else "estimate, 1 sigma"
+        style: dict[str, Any] = {"fmt": "o", "ms": 3.6, "lw": 1.2, "color": color, "label": label}
+        axes.errorbar(at[known], value[known], yerr=sigma[known], **style)
+        axes.plot(at[good & ~known], value[good & ~known], "o", ms=4.2, mfc="none", color=color)
+        axes.plot(at[~good], value[~good], "x", ms=4.2, color=INK)
