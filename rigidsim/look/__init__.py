@@ -10,12 +10,12 @@ Two folders load what draws, and are imported only where a picture is drawn: `ti
 | `figure_names` | their names, without any import |
 | `record`, `signals` | the recorded scene of a dataset; its quantities |
 | `curves`, `paths`, `plots` | what is drawn over time, and in planes, in one form for both |
-| `pages`, `page` | what a scene shows first, and its numbers in words; the summary page |
+| `pages` | what a scene shows first, its numbers in words, pages of text |
 | `units` | units for readers |
 | `stages` | stages by kind of scene, as numbers; a package of its own |
 | `sources`, `gyrostats` | what pulls at a body, and librations; bodies with rotors |
 | `fits` | secular parts, periods and ellipses, by ``analysis`` |
 | `thinning`, `states` | a bounded number of a dataset's rows; lanes of events |
-| `solids`, `symbols` | meshes of bodies; toy tops, globes and maps, edges |
+| `solids` | meshes of bodies, toy tops, globes and maps, edges |
 | `viewer`, `film` | the viewer, also of a run that goes on; pictures and films of a timeline |
 """

@@ -47,13 +47,20 @@ def recorded(
 
 
 def plotted(
-    dataset: xarray.Dataset, name: str, title: str, table: Array, *, of: str = "rad", **options: Any
-) -> Plot:
-    """A plot of columns (rows, n), or one (rows,), in the unit that suits them."""
+    dataset: xarray.Dataset, name: str, title: str, table: Array | None, *, of: str = "rad", **options: Any
+) -> Plot | None:
+    """A plot of columns (rows, n), or one (rows,), in the unit that suits them; None of nothing."""
+    if table is None:
+        return None
     table = table.reshape(len(table), -1)
     divisor, unit = scaled(table, of)
     error = uncertain(dataset, table / divisor, divisor) if of == "rad" else None
     return Plot(name, title, table / divisor, unit=unit, error=error, **({"word": "angle"} | options))
+
+
+def row(name: str, title: str, find: Callable[[xarray.Dataset], Array | None], **options: Any) -> Curve:
+    """The curves of what is found in a dataset."""
+    return lambda dataset: plotted(dataset, name, title, find(dataset), **options)
 
 
 def attitude(dataset: xarray.Dataset) -> Plot | None:
@@ -82,15 +89,6 @@ def grown(dataset: xarray.Dataset, angle: Array) -> tuple[Array, str]:
     if np.nanmax(np.abs(rest)) <= _STILL * (np.nanmax(angle) - np.nanmin(angle)):
         return angle, f", uniform: {turning_text(trend.rate)}"
     return rest, f" less its mean motion, {trend.about}{turning_text(trend.rate)}"
-
-
-def polar_motion(dataset: xarray.Dataset) -> Plot | None:
-    """Both components of polar motion."""
-    table, labels = signals.polar_motion(dataset), ("m₁", "m₂")
-    title = "Polar motion: the spin axis seen from the figure axis"
-    if table is None:
-        return None
-    return plotted(dataset, "polar_motion", title, table, labels=labels, word="polar motion", begins=True)
 
 
 def orientations(dataset: xarray.Dataset) -> dict[str, tuple[Array, Array]]:
@@ -192,11 +190,11 @@ def spin_down(dataset: xarray.Dataset) -> Plot | None:
     return plotted(dataset, "spin", "Size of the angular velocity", signals.norms(table), **options)
 
 
-def swings(dataset: xarray.Dataset) -> tuple[Array, list[str]] | None:
+def swings(dataset: xarray.Dataset) -> tuple[Array | None, list[str]]:
     """Libration angles (rows, 2), rad, less half turns so that they swing about zero, and their names."""
     table = signals.values(dataset, "libration", 2)
     if table is None:
-        return None
+        return None, []
     halves = [int(np.round(np.nanmean(column) / np.pi)) for column in table.T]
     names = zip(("in the orbit's plane", "out of it"), halves, strict=True)
     return table - np.pi * np.array(halves), [name + (f" − {180 * k}°" if k else "") for name, k in names]
@@ -204,10 +202,8 @@ def swings(dataset: xarray.Dataset) -> tuple[Array, list[str]] | None:
 
 def libration(dataset: xarray.Dataset) -> Plot | None:
     """The long axis about the direction to the source, in the orbit's plane and out of it."""
-    found, title = swings(dataset), "Libration: the long axis from the direction to the source"
-    if found is None:
-        return None
-    return plotted(dataset, "libration", title, found[0], labels=found[1], word="libration", begins=True)
+    title, (table, labels) = "Libration: the long axis from the direction to the source", swings(dataset)
+    return plotted(dataset, "libration", title, table, labels=labels, word="libration", begins=True)
 
 
 def regular(dataset: xarray.Dataset) -> Array | None:
@@ -216,42 +212,31 @@ def regular(dataset: xarray.Dataset) -> Array | None:
     return None if table is None or not np.nanmax(np.abs(table[:, 1])) < _STEEP else table
 
 
-def roll_pitch_yaw(dataset: xarray.Dataset) -> Plot | None:
-    """Roll, pitch and yaw against the local frame of the orbit."""
-    table, title = regular(dataset), "Attitude against the local frame of the orbit"
-    options: dict[str, Any] = {"labels": ("roll", "pitch", "yaw"), "begins": True}
-    return None if table is None else plotted(dataset, "roll_pitch_yaw", title, table, **options)
-
-
 def tilt(dataset: xarray.Dataset) -> Plot | None:
     """Tilt of a top against the vertical."""
     angle, title = signals.values(dataset, "tilt"), "Tilt against the vertical"
     if angle is None and signals.is_top(dataset):
         direction, title = signals.pole(dataset, "figure"), "Tilt of the figure axis against the vertical"
         angle = None if direction is None else signals.angle_between(direction, scene_of(dataset).vertical)
-    return None if angle is None else plotted(dataset, "tilt", title, angle, word="θ", begins=True)
+    return plotted(dataset, "tilt", title, angle, word="θ", begins=True)
 
 
 def precession(dataset: xarray.Dataset) -> Plot | None:
     """Precession angle of a top about the vertical, less its mean motion if it goes round."""
-    angle, title = signals.values(dataset, "precession_angle"), "Precession"
-    if angle is None:
-        return None
-    if np.nanmax(angle) - np.nanmin(angle) > _TURN:
+    angle, line = signals.values(dataset, "precession_angle"), ""
+    if angle is not None and np.nanmax(angle) - np.nanmin(angle) > _TURN:
         angle, line = grown(dataset, angle)
-        title += line
     options: dict[str, Any] = {"hues": ("orange",), "word": "φ", "begins": True}
-    return plotted(dataset, "precession_angle", title, angle, **options)
+    return plotted(dataset, "precession_angle", "Precession" + line, angle, **options)
 
 
-def wobble(dataset: xarray.Dataset) -> Plot | None:
+def nutation_angle(dataset: xarray.Dataset) -> Array | None:
     """Angle between the figure axis and the momentum."""
     angle = signals.values(dataset, "nutation_angle")
     direction, along = signals.pole(dataset, "figure"), signals.pole(dataset, "momentum")
     if angle is None and direction is not None and along is not None:
-        angle = signals.angle_between(direction, along)
-    title = "Nutation angle: the figure axis from the momentum"
-    return None if angle is None else plotted(dataset, "nutation_angle", title, angle, hues=("grey",))
+        return signals.angle_between(direction, along)
+    return angle
 
 
 def wobble_and_spin(dataset: xarray.Dataset) -> Plot | None:
@@ -274,13 +259,10 @@ def wobble_and_spin(dataset: xarray.Dataset) -> Plot | None:
     return Plot("wobble_and_spin", title, turns, labels, word="turns")
 
 
-def longitude_libration(dataset: xarray.Dataset) -> Plot | None:
+def longitude_libration(dataset: xarray.Dataset) -> Array | None:
     """The physical libration in longitude."""
     found = sources.librations(dataset)
-    title = "Physical libration in longitude, less the mean rotation"
-    if found is None:
-        return None
-    return plotted(dataset, "longitude_libration", title, found.longitude, word="longitude")
+    return None if found is None else found.longitude
 
 
 def latitude_libration(dataset: xarray.Dataset) -> Plot | None:
@@ -290,12 +272,9 @@ def latitude_libration(dataset: xarray.Dataset) -> Plot | None:
         return None
     labels = ("inclination less its mean", "node less its mean motion, × sin(inclination)")
     table, title = np.stack([found.inclination, found.node], axis=1), "Physical librations in latitude"
-    options: dict[str, Any] = {
-        "labels": labels,
-        "hues": ("orange", "violet"),
-        "window": _WINDOW * loop_rows(table[:, 0]),
-    }
-    return plotted(dataset, "latitude_libration", title, table, **options)
+    window = _WINDOW * loop_rows(found.inclination)
+    hues = ("orange", "violet")
+    return plotted(dataset, "latitude_libration", title, table, labels=labels, hues=hues, window=window)
 
 
 def loop_rows(swing: Array) -> int:
@@ -338,23 +317,22 @@ def locking(dataset: xarray.Dataset) -> Plot | None:
 def rotor_tilts(dataset: xarray.Dataset) -> Plot | None:
     """Angles of the rotors' axes from the angular momentum."""
     whole, rotors = gyrostats.momentum(dataset), gyrostats.rotors(dataset)
-    if whole is None or not rotors:
-        return None
-    table = np.stack([signals.angle_between(whole, rotor.axis) for rotor in rotors], axis=1)
-    title = "Axes of the rotors, from the angular momentum"
-    labels = [rotor.name for rotor in rotors]
-    return plotted(dataset, "rotor_tilts", title, table, labels=labels, begins=_undriven(dataset))
+    columns = [] if whole is None else [signals.angle_between(whole, rotor.axis) for rotor in rotors]
+    options: dict[str, Any] = {"labels": [rotor.name for rotor in rotors], "begins": _undriven(dataset)}
+    title, table = (
+        "Axes of the rotors, from the angular momentum",
+        np.stack(columns, axis=1) if columns else None,
+    )
+    return plotted(dataset, "rotor_tilts", title, table, **options)
 
 
 def rotor_rates(dataset: xarray.Dataset) -> Plot | None:
     """Rates of the rotors relative to the body, if one changes."""
     rotors = gyrostats.rotors(dataset)
-    if not any(rotor.varies for rotor in rotors):
-        return None
-    table = np.stack([rotor.rate for rotor in rotors], axis=1)
-    options: dict[str, Any] = {"of": "rad/s", "word": "rate", "begins": _undriven(dataset)}
-    title, labels = "Rates of the rotors, relative to the body", [rotor.name for rotor in rotors]
-    return plotted(dataset, "rotor_rate", title, table, labels=labels, **options)
+    columns = [rotor.rate for rotor in rotors] if any(rotor.varies for rotor in rotors) else []
+    options: dict[str, Any] = {"labels": [rotor.name for rotor in rotors], "begins": _undriven(dataset)}
+    title, table = "Rates of the rotors, relative to the body", np.stack(columns, axis=1) if columns else None
+    return plotted(dataset, "rotor_rate", title, table, of="rad/s", word="rate", **options)
 
 
 def _undriven(dataset: xarray.Dataset) -> bool:
@@ -380,8 +358,8 @@ def core_axis(dataset: xarray.Dataset) -> Plot | None:
     return plotted(dataset, "core_axis", title, apart, hues=("pink",), from_zero=level)
 
 
-def core_slip(dataset: xarray.Dataset) -> Plot | None:
-    """By how much faster the core turns than the mantle; None if that is only rounding."""
+def core_slip(dataset: xarray.Dataset) -> Array | None:
+    """By how much faster the core turns than the mantle, rad/s; None if that is only rounding."""
     found = _core(dataset)
     if found is None:
         return None
@@ -389,10 +367,7 @@ def core_slip(dataset: xarray.Dataset) -> Plot | None:
     both = signals.norms(core) + signals.norms(mantle)
     # of vectors nearly alike: less is lost than by taking the difference of their norms
     difference = np.einsum("ti,ti->t", core - mantle, core + mantle)
-    if not (np.abs(difference) > _ROUNDING * both**2).any():
-        return None
-    options: dict[str, Any] = {"of": "rad/s", "hues": ("violet",), "word": "difference"}
-    return plotted(dataset, "core_slip", "Rate of the core, less the mantle's", difference / both, **options)
+    return difference / both if (np.abs(difference) > _ROUNDING * both**2).any() else None
 
 
 def own_states(place: int) -> Curve:
@@ -423,16 +398,10 @@ def published(dataset: xarray.Dataset) -> Plot | None:
     return plotted(dataset, "published_angle", title, table, labels=("attitude", "pole"))
 
 
-def published_rotation(dataset: xarray.Dataset) -> Plot | None:
+def published_rotation(dataset: xarray.Dataset) -> Array | None:
     """The rotation vector between them, less its mean, which is an offset of the body's axes."""
-    table, title = (
-        signals.values(dataset, "published_rotation", 3),
-        "The same about the body's axes, less its mean",
-    )
-    options: dict[str, Any] = {"labels": ("about x", "about y", "about z"), "hues": XYZ}
-    if table is None:
-        return None
-    return plotted(dataset, "published_rotation", title, table - table.mean(axis=0), **options)
+    table = signals.values(dataset, "published_rotation", 3)
+    return None if table is None else table - table.mean(axis=0)
 
 
 def sensitivity(variable: str, moved: str) -> Curve:
@@ -458,6 +427,29 @@ def sensitivity(variable: str, moved: str) -> Curve:
 CURVES: dict[str, Curve] = {
     "rates": recorded("angular_velocity", "Angular velocity, body axes", "ω", begins=True),
     "moments": recorded("principal_moments", "Principal moments of inertia", "I", tuple("xyz"), hues=XYZ),
+    "polar_motion": row(
+        "polar_motion", "Polar motion: the spin axis seen from the figure axis", signals.polar_motion,
+        labels=("m₁", "m₂"), word="polar motion", begins=True,
+    ),
+    "roll_pitch_yaw": row(
+        "roll_pitch_yaw", "Attitude against the local frame of the orbit", regular,
+        labels=("roll", "pitch", "yaw"), begins=True,
+    ),
+    "wobble": row(
+        "nutation_angle", "Nutation angle: the figure axis from the momentum", nutation_angle, hues=("grey",)
+    ),
+    "longitude_libration": row(
+        "longitude_libration", "Physical libration in longitude, less the mean rotation", longitude_libration,
+        word="longitude",
+    ),
+    "core_slip": row(
+        "core_slip", "Rate of the core, less the mantle's", core_slip, of="rad/s", word="difference",
+        hues=("violet",),
+    ),
+    "published_rotation": row(
+        "published_rotation", "The same about the body's axes, less its mean", published_rotation,
+        labels=("about x", "about y", "about z"), hues=XYZ,
+    ),
     "sensitivity_attitude": sensitivity("attitude_sensitivity", "attitude moves"),
     "sensitivity_rates": sensitivity("angular_velocity_sensitivity", "angular velocity changes"),
     "sensitivity_position": sensitivity("position_sensitivity", "body moves"),
@@ -466,9 +458,8 @@ CURVES: dict[str, Curve] = {
     **{
         curve.__name__: curve
         for curve in (
-            attitude, polar_motion, obliquity, longitude, braking, spin_down, libration, roll_pitch_yaw, tilt,
-            precession, wobble, wobble_and_spin, longitude_libration, latitude_libration, pointing, locking,
-            rotor_tilts, rotor_rates, core_axis, core_slip, published, published_rotation,
+            attitude, obliquity, longitude, braking, spin_down, libration, tilt, precession, wobble_and_spin,
+            latitude_libration, pointing, locking, rotor_tilts, rotor_rates, core_axis, published,
         )
     },
 }  # fmt: skip

@@ -98,7 +98,7 @@ def _recording_of(named: Sequence[tuple[str, Run]], *, bars: bool = True) -> Ite
         with named[0][1].recording() as timeline:
             yield timeline
         return
-    from rigidsim.look.timeline.comparison import write_comparison  # which loads rerun, see look.viewer
+    from rigidsim.look.timeline import write_comparison  # which loads rerun, see look.viewer
 
     with tempfile.TemporaryDirectory(prefix="rigidsim-view-") as scratch, ExitStack() as opened:
         datasets = [(name, opened.enter_context(run.dataset)) for name, run in named]

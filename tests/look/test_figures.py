@@ -11,7 +11,7 @@ pytest.importorskip("matplotlib")
 from matplotlib.figure import Figure
 
 from rigidsim.look import figures
-from rigidsim.look.figures import polhode
+from rigidsim.look.figures import surfaces as polhode
 from rigidsim.look.pages import numbers
 
 Build = Callable[..., xarray.Dataset]

@@ -11,7 +11,7 @@ import xarray
 pytest.importorskip("rerun")
 
 from rigidsim.look import viewer
-from rigidsim.look.timeline.comparison import write_comparison
+from rigidsim.look.timeline import write_comparison
 
 Build = Callable[..., xarray.Dataset]
 

@@ -6,11 +6,9 @@ panels (``panels.Panel``: what it finds in a dataset, and how that is drawn).
 
 | module | holds |
 | --- | --- |
-| `catalogue` | all figures by name; `figure`, `save_figure`, and the page that suits the scene |
-| `panels`, `composing` | curves, paths and what only paper shows as panels; panels composed to a page |
-| `polhode`, `gyrostat` | polhode, Poinsot's motion; the momentum's sphere of a body with rotors |
-| `eye` | bodies in three dimensions on plain axes |
-| `slides` | one panel in large letters, on a light or a dark ground |
+| `catalogue` | all figures by name, composed of panels to a page, or one of them on a slide |
+| `panels` | curves, paths and what only paper shows as panels |
+| `surfaces` | polhode, Poinsot's motion, the momentum's sphere of a body with rotors |
 | `style` | colours, fonts, the page's heading, keys |
 | `spectrum`, `work_precision`, `sweeps` | figures of `analyse`, `tradeoff` and `sweep` |
 | `fitted` | the figure of a fit |

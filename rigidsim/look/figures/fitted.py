@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib import rc_context
+import xarray
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
-from rigidsim.look.figures.style import BLUE, GREY, INK, ORANGE, PALE, STYLE, VIOLET, ShownFigure, X, Y, Z
+from rigidsim.look.figures.style import (
+    BLUE,
+    GREY,
+    INK,
+    ORANGE,
+    PALE,
+    VIOLET,
+    ShownFigure,
+    X,
+    Y,
+    Z,
+    save,
+    styled,
+)  # fmt: skip
+from rigidsim.look.units import angle_scale, scaled
 
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.figure import Figure
-
-_UNITS = (("s", 1.0), ("h", 3600.0), ("day", 86400.0), ("yr", 31557600.0))
-_LONGEST = 60.0  # of a unit of time that aren't shown in the next one
 _MOST_SETS = 4
 _WITHIN_95 = np.sqrt(-2 * np.log(0.05))  # sigmas of an ellipse that holds 95 % of a plane normal distribution
 _COLORS = (X, Y, Z, ORANGE, VIOLET, GREY)
@@ -26,44 +34,39 @@ _MOST_NUMBERS = 12  # parameters whose correlations are written into their cells
 _EDGES = {"parameters": "", "initial": "", "body": ""}
 
 
+@styled
 def fitted_figure(dataset: xarray.Dataset) -> Figure:
     """The figure of a fit's dataset."""
-    with rc_context(STYLE):  # type: ignore[arg-type]
-        sets = [n for n in range(1, 1 + _MOST_SETS) if f"residual_{n}" in dataset]
-        bands = [name for name in ("attitude", "angular_velocity") if f"{name}_sigma" in dataset]
-        rows = len(sets) + len(bands)
-        figure = ShownFigure(figsize=(12.5, max(6.0, 2.1 * rows + 0.8)), layout="constrained")
-        left, right = np.ravel(figure.subfigures(1, 2, width_ratios=[1.3, 1], squeeze=False))
-        unit, length = _time_unit(dataset)
-        panels = left.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
-        for axes, number in zip(panels, sets, strict=False):
-            _residuals(axes, dataset, number, length)
-        for axes, name in zip(panels[len(sets) :], bands, strict=True):
-            _band(axes, dataset, name, length)
-        panels[-1].set_xlabel(f"time, {unit}")
-        pole = "figure_axis" in dataset and "attitude_covariance" in dataset
-        beside = right.subplots(1 + pole, 1, squeeze=False)[:, 0]
-        _correlations(beside[0], dataset)
-        if pole:
-            _pole(beside[1], dataset, unit, length)
-        figure.suptitle(
-            f"{dataset.attrs.get('title', '')}: {dataset.attrs.get('sentence', '')}", x=0.01, ha="left",
-            fontsize=12.5, fontweight="bold", color=INK,
-        )  # fmt: skip
+    sets = [n for n in range(1, 1 + _MOST_SETS) if f"residual_{n}" in dataset]
+    bands = [name for name in ("attitude", "angular_velocity") if f"{name}_sigma" in dataset]
+    rows = len(sets) + len(bands)
+    figure = ShownFigure(figsize=(12.5, max(6.0, 2.1 * rows + 0.8)), layout="constrained")
+    left, right = np.ravel(figure.subfigures(1, 2, width_ratios=[1.3, 1], squeeze=False))
+    length, unit = scaled(_observed(dataset) - _observed(dataset).min(), "s", dataset.attrs)
+    panels = left.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
+    for axes, number in zip(panels, sets, strict=False):
+        _residuals(axes, dataset, number, length)
+    for axes, name in zip(panels[len(sets) :], bands, strict=True):
+        _band(axes, dataset, name, length)
+    panels[-1].set_xlabel(f"time [{unit}]")
+    pole = "figure_axis" in dataset and "attitude_covariance" in dataset
+    beside = right.subplots(1 + pole, 1, squeeze=False)[:, 0]
+    _correlations(beside[0], dataset)
+    if pole:
+        _pole(beside[1], dataset, unit, length)
+    title = f"{dataset.attrs.get('title', '')}: {dataset.attrs.get('sentence', '')}"
+    figure.suptitle(title, x=0.01, ha="left", fontsize=12.5, fontweight="bold", color=INK)
     return figure
 
 
 def save_fitted(dataset: xarray.Dataset, path: Path, file_format: str = "png") -> Path:
     """Draw the figure to a file."""
-    with rc_context(STYLE):  # type: ignore[arg-type]
-        fitted_figure(dataset).savefig(path, dpi=130, format=file_format)
-    return path
+    return save(fitted_figure, dataset, path, file_format)
 
 
-def _time_unit(dataset: xarray.Dataset) -> tuple[str, float]:
-    times = np.concatenate([x.values for name, x in dataset.coords.items() if str(name).startswith("time_")])
-    span = float(np.ptp(times))
-    return next((x for x in _UNITS if span <= _LONGEST * x[1]), _UNITS[-1])
+def _observed(dataset: xarray.Dataset) -> np.ndarray:
+    """Times of all observations, s."""
+    return np.concatenate([x.values for n, x in dataset.coords.items() if str(n).startswith("time_")])
 
 
 def _residuals(axes: Axes, dataset: xarray.Dataset, number: int, length: float) -> None:
@@ -93,18 +96,18 @@ def _band(axes: Axes, dataset: xarray.Dataset, name: str, length: float) -> None
     """One and two standard deviations of a prediction, to either side."""
     sigma = dataset[f"{name}_sigma"].values
     times = dataset["time"].values / length
-    unit, factor = _readable(sigma, name)
+    divisor, unit = scaled(sigma, "rad" if name == "attitude" else "rad/s", dataset.attrs)
+    sigma = sigma / divisor
     labels = [str(x) for x in dataset[dataset[f"{name}_sigma"].dims[1]].values]
     for n, (label, color) in enumerate(zip(labels, _COLORS, strict=False)):
         for times_sigma, alpha in ((2, 0.10), (1, 0.22)):
-            half = times_sigma * sigma[:, n] * factor
+            half = times_sigma * sigma[:, n]
             axes.fill_between(times, -half, half, color=color, alpha=alpha, linewidth=0)
         for sign in (-1, 1):
-            axes.plot(times, sign * sigma[:, n] * factor, color=color, linewidth=0.9,
+            axes.plot(times, sign * sigma[:, n], color=color, linewidth=0.9,
                       label=label if sign > 0 else None)  # fmt: skip
-    for key, found in dataset.coords.items():
-        if str(key).startswith("time_"):
-            axes.plot(found.values / length, np.zeros(found.size), "|", color=INK, markersize=5, alpha=0.5)
+    observed = _observed(dataset) / length
+    axes.plot(observed, np.zeros(observed.size), "|", color=INK, markersize=5, alpha=0.5)
     axes.set_ylabel(unit)
     where = "space axes" if name == "attitude" else "body axes"
     if np.isfinite(sigma).any():
@@ -120,17 +123,6 @@ def _above(axes: Axes, count: int) -> None:
         loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=count, handlelength=1.0, handletextpad=0.3,
         columnspacing=0.8, borderpad=0.1,
     )  # fmt: skip
-
-
-def _readable(sigma: np.ndarray, name: str) -> tuple[str, float]:
-    """A unit in which values are read easily, and the factor to it."""
-    largest = float(np.nanmax(sigma, initial=0.0))
-    if name == "attitude":
-        for unit, factor in (("deg", 180 / np.pi), ("arcsec", 648000 / np.pi), ("mas", 648e6 / np.pi)):
-            if largest * factor > 0.05:
-                return unit, factor
-        return "uas", 648e9 / np.pi
-    return ("deg/s", 180 / np.pi) if largest > 1e-4 else ("deg/day", 86400 * 180 / np.pi)
 
 
 def _correlations(axes: Axes, dataset: xarray.Dataset) -> None:
@@ -166,7 +158,7 @@ def _pole(axes: Axes, dataset: xarray.Dataset, unit: str, length: float) -> None
     """
     axis, covariances = dataset["figure_axis"].values, dataset["attitude_covariance"].values
     times = dataset["time"].values
-    observed = np.concatenate([x.values for n, x in dataset.coords.items() if str(n).startswith("time_")])
+    observed = _observed(dataset)
     tangents = [_tangent(a, c) for a, c in zip(axis, covariances, strict=True)]
     sizes = np.array([np.trace(x) for x in tangents])
     if not np.isfinite(sizes).any():
@@ -176,12 +168,12 @@ def _pole(axes: Axes, dataset: xarray.Dataset, unit: str, length: float) -> None
     inside = (times >= observed.min()) & (times <= observed.max())
     best = int(np.nanargmin(np.where(inside, sizes, np.inf))) if inside.any() else int(np.nanargmin(sizes))
     first, last = (int(np.argmin(np.abs(times - t))) for t in (observed.min(), observed.max()))
-    name, factor = _readable(np.sqrt(sizes[[first, best, last]]), "attitude")
+    divisor, name = angle_scale(np.sqrt(sizes[[first, best, last]]))
     reach = 0.0
     for index, color in {first: ORANGE, last: BLUE, best: Y}.items():
         values, vectors = np.linalg.eigh(tangents[index])
         angle = float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1])))
-        wide, narrow = (np.sqrt(max(x, 0.0)) * factor for x in values[::-1])
+        wide, narrow = (np.sqrt(max(x, 0.0)) / divisor for x in values[::-1])
         label = f"at {times[index] / length:.4g} {unit}"
         for scale, alpha, line in ((1.0, 0.30, 0.0), (_WITHIN_95, 0.0, 1.2)):
             axes.add_patch(

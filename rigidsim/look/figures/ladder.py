@@ -4,25 +4,26 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from matplotlib import rc_context
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from rigidsim.look.figures.style import BLUE, GREY, INK, ORANGE, PALE, STYLE, ShownFigure
+from rigidsim.look.figures.style import BLUE, GREY, INK, ORANGE, PALE, ShownFigure, save
 
 _LEAST = 1e-12  # arcsec: below, nothing is seen
 
 
 def save_ladder(plan: Mapping[str, Any], path: Path) -> Path:
     """Draw the values of a ``PhysicsPlan`` as a page (PNG)."""
-    with rc_context(STYLE):  # type: ignore[arg-type]
-        height = max(4.2, 1.8 + 0.3 * len(plan["effects"]))
-        figure = ShownFigure(figsize=(12, height), layout="constrained")
-        left, right = figure.subplots(1, 2, width_ratios=(1.1, 1))
-        _worths(left, plan)
-        _models(right, plan)
-        figure.suptitle(f"{plan['name']}: what the scene requires within {plan['error_arcsec']:.4g} arcsec")
-        figure.savefig(path, dpi=130, format="png")
-    return path
+    return save(_ladder, plan, path)
+
+
+def _ladder(plan: Mapping[str, Any]) -> Figure:
+    figure = ShownFigure(figsize=(12, max(4.2, 1.8 + 0.3 * len(plan["effects"]))), layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=(1.1, 1))
+    _worths(left, plan)
+    _models(right, plan)
+    figure.suptitle(f"{plan['name']}: what the scene requires within {plan['error_arcsec']:.4g} arcsec")
+    return figure
 
 
 def _worths(axes: Axes, plan: Mapping[str, Any]) -> None:
@@ -35,6 +36,7 @@ def _worths(axes: Axes, plan: Mapping[str, Any]) -> None:
     axes.axvline(plan["error_arcsec"], color=ORANGE, linewidth=1.3)
     axes.set_xscale("log")
     axes.set_yticks(places, [row["code"] for row in effects])
+    axes.set_ylim(-1.0, max(len(effects), 4))  # a single effect is no giant bar
     axes.set_xlabel("angle that leaving it out makes, arcsec (bar: largest, line: rms)")
     axes.set_title("blue: in the least model")
 

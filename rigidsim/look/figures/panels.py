@@ -10,11 +10,10 @@ import xarray
 from matplotlib.axes import Axes
 
 from rigidsim.look import curves, paths, signals, sources
-from rigidsim.look.figures import eye as eyes
 from rigidsim.look.figures import style
-from rigidsim.look.figures.gyrostat import draw_sphere, sphere
-from rigidsim.look.figures.polhode import draw_poinsot, draw_polhode, rolling
+from rigidsim.look.figures import surfaces as eyes
 from rigidsim.look.figures.style import INK, Z, curve, key, square, titled
+from rigidsim.look.figures.surfaces import draw_poinsot, draw_polhode, draw_sphere, rolling, sphere
 from rigidsim.look.paths import Path
 from rigidsim.look.plots import Plot, paper
 from rigidsim.look.record import scene_of
@@ -83,8 +82,10 @@ def draw_path(axes: Axes, dataset: xarray.Dataset, path: Path) -> None:
 
 def _swinging(dataset: xarray.Dataset) -> tuple[Array, list[str]] | None:
     """Angles of libration (rows, 2), or roll, pitch and yaw (rows, 3), rad, and their names."""
-    table = curves.regular(dataset)
-    return curves.swings(dataset) or (None if table is None else (table, ["roll", "pitch", "yaw"]))
+    (table, names), other = curves.swings(dataset), curves.regular(dataset)
+    if table is not None:
+        return table, names
+    return None if other is None else (other, ["roll", "pitch", "yaw"])
 
 
 def _phases(axes: Axes, dataset: xarray.Dataset, found: tuple[Array, list[str]]) -> None:

@@ -7,47 +7,40 @@ from typing import Any
 
 import numpy as np
 import xarray
-from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from rigidsim.look.figures.style import STYLE, ShownFigure
-from rigidsim.scene.readable import DAY, YEAR, TimeUnit, unit_for
+from rigidsim.look.figures.style import ShownFigure, save, styled
+from rigidsim.scene.readable import YEAR, TimeUnit, unit_for
 
 _CURVE, _LINE, _FOLDED, _UNKNOWN = "#9fb6cd", "#2166ac", "#b2182b", "#636363"
 _ARCSEC = math.pi / 648000
 _MOST_LABELS = 14
 _MOST_SIGNALS = 8
 _DECADES_BELOW = 1.5  # of the faintest line, that are shown
-_UNITS = (
-    ("ps", 1e-12), ("ns", 1e-9), ("µs", 1e-6), ("ms", 1e-3), ("s", 1.0), ("d", DAY), ("yr", YEAR),
-    ("kyr", 1e3 * YEAR), ("Myr", 1e6 * YEAR), ("Gyr", 1e9 * YEAR),
-)  # fmt: skip
 _FAST_DECADES = 2.5  # of frequency from which on the axis is logarithmic
 
 
+@styled
 def spectrum_figure(analysis: xarray.Dataset) -> Figure:
     """Draw amplitude spectra, lines and labels of the first eight signals of an analysis' ``.dataset``."""
     analysis = analysis.isel(signal=np.isfinite(analysis["amplitude"].values).any(axis=1))
     count = min(analysis.sizes["signal"], _MOST_SIGNALS)
-    with rc_context(STYLE):  # type: ignore[arg-type]
-        figure = ShownFigure(figsize=(11, 3.6 * max(count, 0.5) + 0.5), layout="constrained")
-        if not count:
-            figure.text(0.5, 0.5, "no line stands out of the residual", ha="center", color="#555555")
-        for number in range(count):
-            axes = figure.add_subplot(count, 1, number + 1)
-            _draw(axes, analysis.isel(signal=number), float(analysis.attrs["nyquist_frequency"]))
-        title = f"{analysis.attrs.get('title') or 'dataset'}: lines of the spectrum"
-        if analysis.sizes["signal"] > count:
-            title += f", the first {count} of {analysis.sizes['signal']} signals"
-        figure.suptitle(title, x=0.012, ha="left", fontsize=13, fontweight="bold")
+    figure = ShownFigure(figsize=(11, 3.6 * max(count, 0.5) + 0.5), layout="constrained")
+    if not count:
+        figure.text(0.5, 0.5, "no line stands out of the residual", ha="center", color="#555555")
+    for number in range(count):
+        axes = figure.add_subplot(count, 1, number + 1)
+        _draw(axes, analysis.isel(signal=number), float(analysis.attrs["nyquist_frequency"]))
+    title = f"{analysis.attrs.get('title') or 'dataset'}: lines of the spectrum"
+    if analysis.sizes["signal"] > count:
+        title += f", the first {count} of {analysis.sizes['signal']} signals"
+    figure.suptitle(title, x=0.012, ha="left", fontsize=13, fontweight="bold")
     return figure
 
 
 def save_spectrum(analysis: xarray.Dataset, path: Path, *, file_format: str | None = None) -> Path:
     """Draw the spectra into a PNG or SVG file; returns its path."""
-    with rc_context(STYLE):  # type: ignore[arg-type]
-        spectrum_figure(analysis).savefig(path, dpi=140, format=file_format)
-    return path
+    return save(spectrum_figure, analysis, path, file_format)
 
 
 def _draw(axes: Any, signal: xarray.Dataset, nyquist: float) -> None:
@@ -101,12 +94,9 @@ def _draw(axes: Any, signal: xarray.Dataset, nyquist: float) -> None:
 
 
 def _time_unit(rate: np.ndarray) -> TimeUnit:
-    """The shortest unit of time not shorter than the median period: numbers along the axis are at least 1."""
+    """The unit of time of the axis: such that the median line has some turns in it."""
     moving = np.abs(rate[np.abs(rate) > 0])
-    if not len(moving):
-        return TimeUnit("s", 1.0)
-    period = 2 * math.pi / float(np.median(moving))
-    return next((TimeUnit(symbol, size) for symbol, size in _UNITS if size >= period), unit_for(period))
+    return unit_for(40 * math.pi / float(np.median(moving)) if len(moving) else 0.0)
 
 
 def _frequency_axis(axes: Any, rate: np.ndarray, real: bool) -> None:

@@ -4,12 +4,14 @@ import io
 import itertools
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import wraps
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray
-from matplotlib import colormaps
+from matplotlib import colormaps, rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
@@ -82,6 +84,24 @@ class ShownFigure(Figure):
         data = io.BytesIO()
         self.savefig(data, format="png", dpi=100)
         return data.getvalue()
+
+
+def styled(draw: Callable[[Any], Figure]) -> Callable[[Any], Figure]:
+    """A drawing function whose figures have the style."""
+
+    @wraps(draw)
+    def drawn(data: Any) -> Figure:
+        with rc_context(STYLE):  # type: ignore[arg-type]
+            return draw(data)
+
+    return drawn
+
+
+def save(draw: Callable[[Any], Figure], data: Any, path: Path, file_format: str | None = "png") -> Path:
+    """Draw a figure of something to a file, whose path is returned."""
+    with rc_context(STYLE):  # type: ignore[arg-type]
+        draw(data).savefig(path, dpi=140, format=file_format)
+    return path
 
 
 def blank(dataset: xarray.Dataset, width: float, height: float) -> Figure:

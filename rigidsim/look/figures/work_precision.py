@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 import xarray
-from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from rigidsim.look.figures.style import STYLE, ShownFigure
+from rigidsim.look.figures.style import ShownFigure, save, styled
 from rigidsim.scene.choices import method_named
 from rigidsim.scene.readable import span_text
 
@@ -24,23 +23,21 @@ _FRONT = "#1b2733"
 
 def save_work_precision(dataset: xarray.Dataset, path: Path) -> Path:
     """Draw a tradeoff dataset as a page (PNG)."""
-    with rc_context(STYLE):  # type: ignore[arg-type]
-        work_precision_figure(dataset).savefig(path, dpi=130, format="png")
-    return path
+    return save(work_precision_figure, dataset, path)
 
 
+@styled
 def work_precision_figure(dataset: xarray.Dataset) -> Figure:
     """The figure of a tradeoff dataset: the plot, and a key to its numbered points."""
-    with rc_context(STYLE):  # type: ignore[arg-type]
-        figure = ShownFigure(figsize=(12, 6.4), layout="constrained")
-        left, right = figure.subplots(1, 2, width_ratios=(1.55, 1))
-        draw_points(left, dataset)
-        _key(right, dataset)
-        _title(figure, dataset)
-        figure.canvas.draw()
-        figure.set_layout_engine("none")  # the numbers are placed by what is drawn now
-        error, cost, front = _plotted(dataset)
-        _number(left, cost[front], error[front])
+    figure = ShownFigure(figsize=(12, 6.4), layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=(1.55, 1))
+    draw_points(left, dataset)
+    _key(right, dataset)
+    _title(figure, dataset)
+    figure.canvas.draw()
+    figure.set_layout_engine("none")  # the numbers are placed by what is drawn now
+    error, cost, front = _plotted(dataset)
+    _number(left, cost[front], error[front])
     return figure
 
 
@@ -55,7 +52,6 @@ def draw_points(axes: Axes, dataset: xarray.Dataset) -> None:
             markerfacecolor=color if held[n] or marker == _STEPLESS else "white", markeredgewidth=1.3,
             alpha=0.45 if short[n] else 1.0, linestyle="none", zorder=3,
         )  # fmt: skip
-    _draw_models(axes, dataset)
     _draw_others(axes, dataset)
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -67,28 +63,17 @@ def draw_points(axes: Axes, dataset: xarray.Dataset) -> None:
     _legend(axes, dataset, short.any())
 
 
-def _draw_models(axes: Axes, dataset: xarray.Dataset) -> None:
-    """Draw averaged models beside the settings, with names: errors of axes at the end of the whole motion."""
-    for n in range(dataset.sizes.get("model", 0)):
-        one = dataset.isel(model=n)
-        place = float(one["model_cpu_ratio"]), float(one["model_error"])
-        axes.plot(*place, "P", markersize=10, color=_OTHER, linestyle="none", zorder=3)
-        axes.annotate(
-            str(one["model"].item()).replace("_", " "), place, xytext=(9, 0), textcoords="offset points",
-            va="center", fontsize=8.5, color=_OTHER,
-        )  # fmt: skip
-
-
 def _draw_others(axes: Axes, dataset: xarray.Dataset) -> None:
-    """Draw trajectories of other tools, with their names."""
-    for n in range(dataset.sizes.get("other", 0)):
-        one = dataset.isel(other=n)
-        place = float(one["other_cpu_ratio"]), float(one["other_error"])
-        axes.plot(*place, "X", markersize=9, color=_OTHERS, linestyle="none", zorder=3)
-        axes.annotate(
-            str(one["other"].item()), place, xytext=(-8, 0), textcoords="offset points",
-            ha="right", va="center", fontsize=8.5, color=_OTHERS,
-        )  # fmt: skip
+    """Draw averaged models, with errors of axes at the end of the whole motion, and other tools' files."""
+    for kind, marker, color, place in (("model", "P", _OTHER, 9), ("other", "X", _OTHERS, -8)):
+        for n in range(dataset.sizes.get(kind, 0)):
+            one = dataset.isel({kind: n})
+            at = float(one[f"{kind}_cpu_ratio"]), float(one[f"{kind}_error"])
+            axes.plot(*at, marker, markersize=9, color=color, linestyle="none", zorder=3)
+            axes.annotate(
+                str(one[kind].item()).replace("_", " "), at, xytext=(place, 0), textcoords="offset points",
+                ha="left" if place > 0 else "right", va="center", fontsize=8.5, color=color,
+            )  # fmt: skip
 
 
 def _number(axes: Axes, cost: np.ndarray, error: np.ndarray) -> None:

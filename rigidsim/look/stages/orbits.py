@@ -7,12 +7,11 @@ import xarray
 
 from rigidsim.look import signals
 from rigidsim.look.record import body_of, called, color_of, scene_of
-from rigidsim.look.solids import rotation_matrix
+from rigidsim.look.solids import globe, graticule, rotation_matrix
 from rigidsim.look.sources import kepler_path, orbit_normal
 from rigidsim.look.stages import bodies, parts
 from rigidsim.look.stages.bodies import FIELD, Subject, direction_of, plane_view, vectors_of
 from rigidsim.look.stages.parts import SPACE, Array, Arrow, Camera, Line, Picture, Solid, Spot, Stage, Vector
-from rigidsim.look.symbols import globe, graticule
 from rigidsim.scene.bodies.presets import KnownBody
 from rigidsim.scene.rotations import quaternion_of
 

@@ -135,22 +135,12 @@ class Vector:
 
 @dataclass(frozen=True)
 class Solid:
-    """A mesh placed on the stage, in its units."""
+    """A mesh placed on the stage, in its units; with a colour a translucent one."""
 
     name: str
     mesh: Mesh
     place: str = SPACE
-
-
-@dataclass(frozen=True)
-class Shell:
-    """A translucent ellipsoid, turned by a quaternion [x, y, z, w] within its place."""
-
-    name: str
-    half_sizes: Array
-    color: Color
-    place: str
-    quaternion: Array
+    clear: Color | None = None
 
 
 @dataclass(frozen=True)
@@ -200,7 +190,6 @@ class Stage:
     spots: list[Spot] = field(default_factory=list)
     vectors: list[Vector] = field(default_factory=list)
     solids: list[Solid] = field(default_factory=list)
-    shells: list[Shell] = field(default_factory=list)
     cones: list[Cone] = field(default_factory=list)
     frames: dict[str, NDArray[np.float32]] = field(default_factory=dict)  # quaternions of others, by name
     looked_from: str = ""  # frame that the camera is in; empty for space

@@ -6,18 +6,19 @@ and the herpolhode on the other.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import xarray
 
 from rigidsim.look import signals
 from rigidsim.look.record import scene_of
-from rigidsim.look.stages import orbits, parts, planet, precession, top
+from rigidsim.look.solids import ball, graticule
+from rigidsim.look.stages import orbits, parts, planet, top
 from rigidsim.look.stages.bodies import Subject, source_arrows, vectors_of, with_track
-from rigidsim.look.stages.parts import BODY, Array, Arrow, Camera, Line, Picture, Shell, Spot, Stage, Vector
+from rigidsim.look.stages.parts import BODY, Array, Arrow, Camera, Line, Picture, Solid, Spot, Stage, Vector
 from rigidsim.look.stages.uncertainty import with_cone
 from rigidsim.look.stages.wheels import with_wheels
-from rigidsim.scene.rotations import quaternion_of
 
 ENERGY: tuple[int, int, int] = (120, 150, 200)
 
@@ -35,8 +36,8 @@ def free(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     stages = [stage]
     if subject.attitude is None:
         notes.append("no attitude was recorded: the body is shown in its own axes and doesn't turn")
-        stage.shells.append(_shell(dataset, 1.6 * radii / float(np.linalg.norm(rates, axis=1).max())))
-        return Picture("free rotation", stages, notes)
+        stage = _ellipsoid(dataset, stage, 1.6 * radii / float(np.linalg.norm(rates, axis=1).max()))
+        return Picture("free rotation", [stage], notes)
     # the principal axis nearest to the first angular velocity
     along = scene_of(dataset).axes @ rates[0]
     k = int(np.abs(along).argmax())
@@ -56,10 +57,13 @@ def free(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     return Picture("free rotation", stages, notes)
 
 
-def _shell(dataset: xarray.Dataset, radii: Array) -> Shell:
-    # principal axes are rows: the rotation from these to body axes is the transpose
-    turn = quaternion_of(scene_of(dataset).axes.T[None])[0]
-    return Shell("energy_ellipsoid", radii, ENERGY, BODY, turn[[1, 2, 3, 0]])
+def _ellipsoid(dataset: xarray.Dataset, stage: Stage, radii: Array) -> Stage:
+    """The stage with the ellipsoid of energy, translucent, with its meridians and parallels."""
+    turn = scene_of(dataset).axes.T  # principal axes are rows: the rotation from these to body axes
+    solid = Solid("energy_ellipsoid", ball(*radii).moved(turn, np.zeros(3)), BODY, ENERGY)
+    rings = enumerate(graticule(radii, lift=1.0))
+    lines = [Line(f"energy/{k}", ENERGY, ring @ turn.T, BODY, 1.0, 0.5) for k, ring in rings]
+    return replace(stage, solids=[*stage.solids, solid], lines=[*stage.lines, *lines])
 
 
 def _axis_name(axis: Array) -> str:
@@ -85,7 +89,7 @@ def _poinsot(dataset: xarray.Dataset, along: Array, radii: Array, rates: Array, 
     center = 0.35 * floor
     on_ellipsoid, on_plane = "polhode, on the ellipsoid of energy", "herpolhode, on the invariable plane"
     start, words = np.zeros(3), "angular momentum L"
-    return Stage(
+    rolling = Stage(
         root="poinsot",
         title="Poinsot's construction",
         unit=1.0,
@@ -104,9 +108,9 @@ def _poinsot(dataset: xarray.Dataset, along: Array, radii: Array, rates: Array, 
         ],
         vectors=[Vector("momentum", "L", parts.MOMENTUM, start, 1.2 * floor, words=words, radius=0.012)],
         spots=[Spot("plane/label", "invariable plane", parts.PALE, floor - 0.98 * size * second)],
-        shells=[_shell(dataset, radii * scale)],
         camera=Camera(center + eye, center, -along),
     )
+    return _ellipsoid(dataset, rolling, radii * scale)
 
 
 KINDS: tuple[Callable[[xarray.Dataset, Subject], Picture | None], ...] = (
@@ -115,7 +119,7 @@ KINDS: tuple[Callable[[xarray.Dataset, Subject], Picture | None], ...] = (
     orbits.flight,
     orbits.satellite,
     planet.picture,
-    precession.picture,
+    planet.axes_picture,
     free,
 )
 """Functions that return the picture of a scene of their kind, or None for others; the first that has one."""

@@ -7,11 +7,10 @@ import xarray
 
 from rigidsim.look import signals
 from rigidsim.look.record import scene_of
-from rigidsim.look.solids import Mesh
+from rigidsim.look.solids import Mesh, spinning_top
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import FIELD, Subject, vectors_of
 from rigidsim.look.stages.parts import BODY, SPACE, Array, Camera, Line, Picture, Spot, Trail, Vector
-from rigidsim.look.symbols import spinning_top
 
 TRACE = 1.0  # where on the axis the traced point is, in reaches
 _SYMMETRIC = 1e-9  # of the moments

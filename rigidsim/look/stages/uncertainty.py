@@ -108,7 +108,7 @@ def with_cone(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Pi
         notes.append("where there is no cone, an undetermined parameter would move the axis without bounds")
     table, title = np.column_stack([angles, found.about]), "1 sigma of the figure axis"
     labels = ("widest", "narrowest", "about it")
-    plot = replace(plotted(dataset, _LEADING, title, table, labels=labels, word="1 sigma"), error=None)
+    plot = plotted(dataset, _LEADING, title, table, labels=labels, word="1 sigma")
     return replace(
         picture,
         stages=[
@@ -116,7 +116,7 @@ def with_cone(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Pi
             for one in picture.stages
         ],
         notes=[*picture.notes, *notes],
-        plots=[*picture.plots, plot],
+        plots=[*picture.plots, *([replace(plot, error=None)] if plot else [])],
     )
 
 

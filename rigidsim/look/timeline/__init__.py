@@ -4,13 +4,12 @@ Importing this package loads rerun, so import it only where a timeline is writte
 
 | module | holds |
 | --- | --- |
-| `writing` | `write_timeline`: dataset to `timeline.rrd`; `LiveRecording`: of a run that goes on; the file |
-| `comparison` | `write_comparison`: several runs side by side |
+| `writing` | `write_timeline`, `write_comparison`: datasets to files; `LiveRecording`: of a running one |
 | `drawn` | everything that is drawn of one run |
-| `drawing`, `plotting` | stages, and plots, planes, legend and clock, as rerun entities |
+| `entities` | stages, plots, planes, legend and clock as rerun entities |
 | `blueprint` | the page that the viewer opens with, for one run and for several |
 """
 
-from rigidsim.look.timeline.writing import write_timeline
+from rigidsim.look.timeline.writing import write_comparison, write_timeline
 
-__all__ = ["write_timeline"]
+__all__ = ["write_comparison", "write_timeline"]

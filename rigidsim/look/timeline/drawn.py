@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from rigidsim.look import signals
 from rigidsim.look.curves import CURVES
-from rigidsim.look.page import config_page, notes_page, summary_page
-from rigidsim.look.pages import leading
+from rigidsim.look.pages import config_page, leading, notes_page, summary_page
 from rigidsim.look.paths import PATHS, Path, sections
 from rigidsim.look.plots import Plot, drift_plot, other_plots
 from rigidsim.look.solids import Array
@@ -23,7 +22,7 @@ from rigidsim.look.stages.parts import Picture, Stage, screen_seconds
 from rigidsim.look.stages.registry import build_picture
 from rigidsim.look.states import States, charts_of, states_of
 from rigidsim.look.thinning import by_extremes, thin, thinned_indices
-from rigidsim.look.timeline import drawing, plotting
+from rigidsim.look.timeline import entities
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.readable import DAY, YEAR, TimeWords, epoch_of
 
@@ -171,29 +170,29 @@ class DrawnRun:
         for name, text in self.pages.items():
             document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
             recording.log(f"/{name.lower()}", document, static=True)
-        drawing.draw_static(recording, self.picture.stages)
-        plotting.draw_plots(recording, self.plots, self._times(np.array([0, len(self.seconds) - 1])))
-        plotting.draw_paths(recording, self.paths)
+        entities.draw_static(recording, self.picture.stages)
+        entities.draw_plots(recording, self.plots, self._times(np.array([0, len(self.seconds) - 1])))
+        entities.draw_paths(recording, self.paths)
         for lane in self.states:
             ticks = np.rint(lane.seconds / self.clock.seconds_per_tick).astype(np.int64)
             ticks += self.clock.since or 0
-            plotting.draw_states(recording, lane, [self._clock_column(ticks)])
+            entities.draw_states(recording, lane, [self._clock_column(ticks)])
         explained = self.picture.stages if legend is None else legend
         if not explained:
             return
-        told = thinned_indices(len(self.seconds), plotting.CLOCK_ROWS)
+        told = thinned_indices(len(self.seconds), entities.CLOCK_ROWS)
         words = [f"t = {text}" for text in self.words.coarse(self.seconds[told].tolist())]
-        plotting.draw_legend(recording, plotting.legend_of(explained), words, self._times(told))
+        entities.draw_legend(recording, entities.legend_of(explained), words, self._times(told))
 
     def draw_rows(self, recording: rr.RecordingStream, rows: slice) -> None:
         """Draw what changes, for some rows."""
         times = self._times(rows)
         for stage in self.picture.stages:
-            for path, picked, columns in drawing.stage_columns(stage, rows):
+            for path, picked, columns in entities.stage_columns(stage, rows):
                 mine = times if picked == rows else self._times(picked)
                 recording.send_columns(path, indexes=mine, columns=columns)
-        plotting.draw_plot_rows(recording, self.plots, times, rows)
-        plotting.draw_path_rows(recording, self.paths, times, rows)
+        entities.draw_plot_rows(recording, self.plots, times, rows)
+        entities.draw_path_rows(recording, self.paths, times, rows)
 
     def _times(self, rows: slice | NDArray[np.int64]) -> list[rr.TimeColumn]:
         return [self._clock_column(self.clock.ticks[rows]), rr.TimeColumn("step", sequence=self.steps[rows])]

@@ -273,7 +273,7 @@ def _local_defects(seen: Evidence, verdict: str) -> tuple[LocalDefects | None, d
 
 def _draw(experiment: Experiment, given: Attitudes, found: Convention, path: Path) -> None:
     """Write a timeline of the experiment and the trajectory, side by side, and the angle between them."""
-    from rigidsim.look.timeline.comparison import write_comparison  # which loads rerun
+    from rigidsim.look.timeline import write_comparison  # which loads rerun
 
     rows = np.unique(np.linspace(0, len(given.times) - 1, min(len(given.times), _MOST_SHOWN)).astype(int))
     own, name = _sampled(experiment, given.times[rows]).dataset, Path(given.trajectory.source).stem
