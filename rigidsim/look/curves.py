@@ -29,6 +29,7 @@ _ROUNDING = 1e-11  # of rates, below which their difference tells nothing
 _DECADES = 3.0  # by which a rate falls, from which its axis is logarithmic
 _LOOPS, _WINDOW = 3, 8  # of a long fast path that are shown bright; times as many, that a plot shows
 _AXES = {"figure": "blue", "spin": "orange", "momentum": "violet"}
+STATES = tuple(f"states_{place}" for place in range(3))
 
 
 def recorded(
@@ -464,4 +465,3 @@ CURVES: dict[str, Curve] = {
     },
 }  # fmt: skip
 """All of them by name."""
-STATES = tuple(f"states_{place}" for place in range(3))

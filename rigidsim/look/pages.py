@@ -15,6 +15,15 @@ from rigidsim.look.units import angle_text, turning_text
 from rigidsim.scene.readable import TimeWords, span_text
 
 Names = list[str]
+_LEAST = 1e-9  # rad, of a longitude's advance, below which it is rounding
+_GLYPHS = (
+    (0x20, 0x7E), (0xA0, 0x148), (0x14A, 0x1C3), (0x1C5, 0x31E), (0x384, 0x38A), (0x38E, 0x3A1),
+    (0x3A3, 0x3E1), (0x3F0, 0x49D), (0x4A0, 0x4FF), (0x1E00, 0x1EFF), (0x2000, 0x200A), (0x2010, 0x2027),
+    (0x2030, 0x205E), (0x2074, 0x208E), (0x2090, 0x209C), (0x20A0, 0x20BF), (0x2190, 0x2199),
+)  # fmt: skip
+_SINGLE = "\n\t²³−√∞≈≠≤≥∂∆∏∑∫■▲▼◆●○◊"
+_RANGES = "".join(f"{re.escape(chr(low))}-{re.escape(chr(high))}" for low, high in _GLYPHS)
+_WITHOUT_GLYPH = re.compile(f"[^{_SINGLE}{_RANGES}]")
 
 
 def leading(rows: xarray.Dataset) -> tuple[Names, Names]:
@@ -110,9 +119,6 @@ def numbers(rows: xarray.Dataset) -> list[tuple[str, str]]:
     return found
 
 
-_LEAST = 1e-9  # rad, of a longitude's advance, below which it is rounding
-
-
 def _range(angle: Array) -> str:
     low, high = float(np.nanmin(angle)), float(np.nanmax(angle))
     texts = [angle_text(x, 6, like=high) for x in (low, high)]
@@ -163,14 +169,6 @@ def legible(text: str) -> str:
 
 
 # What Inter has of the blocks that texts about motion use; what lies outside is written as a question mark.
-_GLYPHS = (
-    (0x20, 0x7E), (0xA0, 0x148), (0x14A, 0x1C3), (0x1C5, 0x31E), (0x384, 0x38A), (0x38E, 0x3A1),
-    (0x3A3, 0x3E1), (0x3F0, 0x49D), (0x4A0, 0x4FF), (0x1E00, 0x1EFF), (0x2000, 0x200A), (0x2010, 0x2027),
-    (0x2030, 0x205E), (0x2074, 0x208E), (0x2090, 0x209C), (0x20A0, 0x20BF), (0x2190, 0x2199),
-)  # fmt: skip
-_SINGLE = "\n\t²³−√∞≈≠≤≥∂∆∏∑∫■▲▼◆●○◊"
-_RANGES = "".join(f"{re.escape(chr(low))}-{re.escape(chr(high))}" for low, high in _GLYPHS)
-_WITHOUT_GLYPH = re.compile(f"[^{_SINGLE}{_RANGES}]")
 
 
 def _table(found: list[tuple[str, str]]) -> list[str]:

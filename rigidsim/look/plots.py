@@ -29,6 +29,10 @@ _STILL = 1e-9  # of a curve's size, below which what it does is rounding
 _TOGETHER = 3e-3  # of a curve's range: what lies nearer is covered by its line
 _SEEN = 2e-3  # of a curve's range: a narrower band is no wider than the line
 _MOST_CURVES = 16  # of one variable, so that a recorded matrix history stays readable
+TYPICAL, MOST = 0.5, 50.0
+"""In units of tolerance times sqrt(steps): a random walk of one rounding per step (Brouwer 1937), and the
+drift above which a summary warns (a few roundings of several operations per step).
+"""
 
 
 def paper(hue: str | Color) -> Any:
@@ -143,12 +147,6 @@ def drift_plot(dataset: xarray.Dataset) -> Plot | None:
         levels=levels,
         band=band,
     )
-
-
-TYPICAL, MOST = 0.5, 50.0
-"""In units of tolerance times sqrt(steps): a random walk of one rounding per step (Brouwer 1937), and the
-drift above which a summary warns (a few roundings of several operations per step).
-"""
 
 
 def rounding_law(dataset: xarray.Dataset) -> Array | None:

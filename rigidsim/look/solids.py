@@ -38,6 +38,8 @@ _UPPER = (70, 118, 190)
 _LOWER = (200, 96, 62)
 _CUBE = {"solid": "cuboid", "dimensions": {"size": [1.0, 1.0, 1.0]}}
 _BARE = (92, 94, 100)  # the back of a plate that light and air meet from its front alone
+_BELTS = MINOR_SEGMENTS // 2  # each of two rings of faces, so that their edges are even
+_SHARP = np.cos(np.deg2rad(25.0))  # between the normals of two faces: what counts as an edge
 
 
 @dataclass(frozen=True)
@@ -237,10 +239,6 @@ def ball(a: float, b: float, c: float, segments: int = SEGMENTS, rings: int = MI
     normals = unit.normals / axes
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return Mesh(unit.vertices * axes, unit.triangles, normals, unit.colors)
-
-
-_BELTS = MINOR_SEGMENTS // 2  # each of two rings of faces, so that their edges are even
-_SHARP = np.cos(np.deg2rad(25.0))  # between the normals of two faces: what counts as an edge
 
 
 def spinning_top(radius: float, height: float, whole: float) -> Mesh:

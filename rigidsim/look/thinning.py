@@ -29,9 +29,7 @@ def thin(dataset: xarray.Dataset, rows: int) -> xarray.Dataset:
         raise ValueError("the dataset has no time coordinate: nothing to show along time")
     count = dataset.sizes["time"]
     thinned_indices(count, rows)  # refuses what can't be
-    along = {str(n): v for n, v in dataset.data_vars.items() if "time" in v.dims and v.dtype.kind in "fiub"}
-    wanted = dataset[[name for name, variable in along.items() if "residual_of" not in variable.attrs]]
-    stride = _stride(count, rows)
+    wanted, stride = _along_time(dataset), _stride(count, rows)
     # A slice is a strided read in HDF5; a list of indices would be read index by index. Each read makes some
     # kilobytes of notes for every chunk that it touches, hence pieces.
     piece = stride * max(1, ROWS_AT_ONCE // stride)
@@ -43,37 +41,52 @@ def thin(dataset: xarray.Dataset, rows: int) -> xarray.Dataset:
     return joined.transpose("time", ...)
 
 
+def _along_time(dataset: xarray.Dataset) -> xarray.Dataset:
+    along = {str(n): v for n, v in dataset.data_vars.items() if "time" in v.dims and v.dtype.kind in "fiub"}
+    return dataset[[name for name, variable in along.items() if "residual_of" not in variable.attrs]]
+
+
 def _stride(count: int, rows: int) -> int:
     return max(1, -(-(count - 1) // (rows - 1)))
 
 
-def by_extremes(dataset: xarray.Dataset, rows: int) -> xarray.Dataset:
-    """The rows of `thin`, but of each component's values the least and the largest of every two strides in
-    turn, so that a fast motion keeps its amplitude as a curve; times are those of `thin`, the first and the
-    last row's values are their own. All rows are read, `ROWS_AT_ONCE` at a time. See `thin` for errors.
+def thin_with_extremes(dataset: xarray.Dataset, rows: int) -> tuple[xarray.Dataset, xarray.Dataset]:
+    """The rows of `thin`; and these with, of each component's values, the least and the largest of every two
+    strides in turn, so that a fast motion keeps its amplitude as a curve. The first and the last row's values
+    are their own. All rows are read once, `ROWS_AT_ONCE` at a time. See `thin` for errors.
     """
-    found, count = thin(dataset, rows), dataset.sizes["time"]
-    pair = 2 * _stride(count, rows)
-    if pair == 2:  # every row is shown
-        return found
-    piece = pair * max(1, ROWS_AT_ONCE // pair)
+    count = dataset.sizes.get("time", 0)
+    stride = _stride(count, rows) if rows > 1 else 1
+    if stride == 1:  # every row is shown, or nothing can be
+        found = thin(dataset, rows)
+        return found, found
+    wanted, piece = _along_time(dataset), 2 * stride * max(1, ROWS_AT_ONCE // (2 * stride))
+    plain, extremes = [], []
     for first in range(0, count, piece):
-        part = dataset[list(found.data_vars)].isel(time=slice(first, min(first + piece, count))).load()
-        starts = np.arange(0, part.sizes["time"], pair)
-        place = 2 * (first // pair)
-        for name in found.data_vars:
-            if found[name].dtype.kind != "f":
-                continue
-            values = np.moveaxis(np.asarray(part[name].values), part[name].dims.index("time"), 0)
-            low, high = np.fmin.reduceat(values, starts), np.fmax.reduceat(values, starts)
-            target = found[name].values  # time first, in memory
-            room = target[place : place + 2 * len(starts)]
-            for k, extremes in enumerate((low, high)):
-                inner = room[k::2]
-                inner[...] = extremes[: len(inner)]
-    for row in (0, -1):
-        ends = dataset[list(found.data_vars)].isel(time=row).load()
-        for name in found.data_vars:
-            if found[name].dtype.kind == "f":
-                found[name].values[row] = ends[name].values
+        part = wanted.isel(time=slice(first, min(first + piece, count))).load()
+        strided = part.isel(time=slice(None, None, stride))
+        plain.append(strided.copy(deep=True))
+        extremes.append(strided.map(_extremes, args=(part, 2 * stride)))
+    if (count - 1) % stride:
+        last = wanted.isel(time=slice(count - 1, count)).load()
+        plain.append(last)
+        extremes.append(last)
+    whole, shown = (
+        xarray.concat(parts, dim="time", data_vars="all", combine_attrs="override").transpose("time", ...)
+        for parts in (plain, extremes)
+    )
+    for name in shown.data_vars:
+        shown[name].values[[0, -1]] = whole[name].values[[0, -1]]
+    return whole, shown
+
+
+def _extremes(strided: xarray.DataArray, part: xarray.Dataset, pair: int) -> xarray.DataArray:
+    found = strided.copy(deep=True)
+    if found.dtype.kind == "f":
+        along = found.dims.index("time")
+        values, target = np.moveaxis(part[found.name].values, along, 0), np.moveaxis(found.values, along, 0)
+        starts = np.arange(0, len(values), pair)
+        for k, reduce in enumerate((np.fmin, np.fmax)):
+            room = target[k::2]
+            room[...] = reduce.reduceat(values, starts)[: len(room)]
     return found

@@ -16,6 +16,7 @@ from rigidsim.scene.readable import ANGLE_UNITS, DAY, YEAR, TimeUnit, angle_unit
 _MAS = math.pi / 180 / 3600e3
 _SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 _PREFIXED = ("rad/s", "m", "m/s")
+_SOME_MINUTES = 300.0  # s, up to which a clock counts seconds
 
 
 def pretty_unit(unit: str) -> str:
@@ -103,6 +104,3 @@ def clock(dataset: xarray.Dataset) -> tuple[Array, TimeUnit, str]:
     if unit.seconds == YEAR:
         return readable.julian_year(epoch) + time, unit, f"year ({epoch.uniform().scale})"
     return time, unit, f"time since {'J2000' if epoch == J2000 else epoch} [{unit.symbol}]"
-
-
-_SOME_MINUTES = 300.0  # s, up to which a clock counts seconds

@@ -14,13 +14,11 @@ from typing import Any
 import numpy as np
 import xarray
 from matplotlib import rc_context
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Tick
-from matplotlib.colors import to_hex, to_rgb
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
-from matplotlib.spines import Spine
 from matplotlib.text import Text
 
 from rigidsim.look import signals
@@ -29,7 +27,7 @@ from rigidsim.look.figure_names import FIGURES, OVERVIEW, SPECTRUM
 from rigidsim.look.figures.panels import OVER_TIME, PLANES, Panel
 from rigidsim.look.figures.style import GREY, INK, PALE, STYLE, blank
 from rigidsim.look.pages import leading, numbers
-from rigidsim.look.plots import Plot, moves
+from rigidsim.look.plots import HUES, Plot, moves, paper, screen
 from rigidsim.look.thinning import thin
 from rigidsim.look.units import clock
 from rigidsim.scene.parts_of_values import in_time_order
@@ -47,6 +45,16 @@ _PLANES_WIDE = 5.2  # width of a plane where only planes stand side by side
 
 
 _Drawn = Sequence[tuple[Panel, Any]]
+GROUNDS = ("light", "dark")
+_DARK, _BRIGHT, _GRID = "#14171d", "#f1f3f5", "#2c323c"
+_FADED = "#566071"
+_LETTERS = 1.3  # on a page of half a slide's width, which is enlarged again where it is shown
+_SLIDE = 7.6, 3.6  # inches; with its heading about 16:9
+_THICK = 1.5  # lines, times
+SUFFIXES = (".png", ".svg")
+_DOTS, _SLIDE_DOTS = 160, 250  # per inch
+_TURNS, _ATTITUDE = "angular_velocity recorded", "an attitude recorded"
+_AXIS = "an attitude or an axis (figure_axis, momentum_axis, obliquity) recorded"
 
 
 @dataclass(frozen=True)
@@ -215,15 +223,6 @@ def _table(axes: Axes, lines: list[tuple[str, str]]) -> None:
         axes.text(0.56, height, value, color=INK, fontsize=9, va="center", clip_on=False)
 
 
-GROUNDS = ("light", "dark")
-_DARK, _BRIGHT, _GRID = "#14171d", "#f1f3f5", "#2c323c"
-_FADED = "#566071"
-_LETTERS = 1.3  # on a page of half a slide's width, which is enlarged again where it is shown
-_SLIDE = 7.6, 3.6  # inches; with its heading about 16:9
-_THICK = 1.5  # lines, times
-_LUMINOUS = 0.45  # relative luminance, below which a colour is raised on a dark ground
-
-
 def slide(shown: Shown, panel: Panel, found: Any, ground: str) -> Figure:
     """One panel of a run; of many swings over time the first, as they can be followed on a wall.
 
@@ -255,49 +254,22 @@ def _is_size(key: str) -> bool:
 
 
 def darkened(figure: Figure) -> None:
-    """Turn a drawn figure to a dark ground: letters and lines of the frame bright, dark colours raised."""
+    """Turn a drawn figure to a dark ground: letters and frame bright, hues those of the screen."""
     figure.set_facecolor(_DARK)
-    for artist in figure.findobj(_coloured):
-        _raise(artist)
+    hues = {paper(name): to_hex(paper(screen(name))) for name in HUES}
+    hues |= {PALE: _FADED, INK: _BRIGHT, GREY: _BRIGHT}
+    for artist in figure.findobj(lambda one: hasattr(one, "get_color") and not isinstance(one, Tick)):
+        color: Any = artist.get_color()  # type: ignore[attr-defined]
+        if isinstance(color, str) and color != "none":  # else of a collection, coloured by a map
+            other = _BRIGHT if isinstance(artist, Text) else color
+            artist.set_color(hues.get(color, other))  # type: ignore[attr-defined]
+        for effect in artist.get_path_effects():  # the pale rim of letters on a light ground
+            getattr(effect, "_gc", {}).update(foreground=_DARK)
     for axes in figure.axes:
         axes.set_facecolor(_DARK)
         axes.tick_params(colors=_BRIGHT, grid_color=_GRID)
-
-
-def _coloured(artist: Artist) -> bool:
-    return hasattr(artist, "get_color") or isinstance(artist, Spine)
-
-
-def _raise(artist: Any) -> None:
-    if isinstance(artist, Tick):
-        return
-    if isinstance(artist, Spine):
-        artist.set_edgecolor("#6b7280")
-    elif isinstance(artist, Text):
-        artist.set_color(_readable(artist.get_color(), 1.0))
-        for effect in artist.get_path_effects():  # the pale rim of letters on a light ground
-            getattr(effect, "_gc", {}).update(foreground=_DARK)
-    else:
-        color = artist.get_color()
-        if not isinstance(color, str) or color == "none":
-            return  # of a collection, coloured by a map
-        artist.set_color(_FADED if color == PALE else _readable(color, 0.4))  # what others stand out from
-
-
-def _readable(color: Any, share: float) -> str:
-    """The colour, mixed with that share of the bright one if it is too dark to be seen."""
-    rgb = to_rgb(color)
-    luminance = sum(w * c for w, c in zip((0.2126, 0.7152, 0.0722), rgb, strict=True))
-    if luminance >= _LUMINOUS:
-        return to_hex(rgb)
-    grey = max(rgb) - min(rgb) < 0.2
-    part = 1.0 if grey else min(share, 0.45)
-    red, green, blue = ((1 - part) * c + part * b for c, b in zip(rgb, to_rgb(_BRIGHT), strict=True))
-    return to_hex((red, green, blue))
-
-
-SUFFIXES = (".png", ".svg")
-_DOTS, _SLIDE_DOTS = 160, 250  # per inch
+        for spine in axes.spines.values():
+            spine.set_edgecolor(_FADED)
 
 
 @dataclass(frozen=True)
@@ -317,8 +289,6 @@ class Kind:
         return any(panels[name].find(rows) is not None for name in names)
 
 
-_TURNS, _ATTITUDE = "angular_velocity recorded", "an attitude recorded"
-_AXIS = "an attitude or an axis (figure_axis, momentum_axis, obliquity) recorded"
 KINDS: dict[str, Kind] = {
     "polar_motion": Kind("a spin near a principal axis", ["polar_motion"], ["polar_motion"]),
     "pole_path": Kind(_AXIS, (), ["pole_path", "nutation"]),

@@ -237,13 +237,3 @@ def square(axes: Axes, x: Array, y: Array) -> None:
     axes.set_aspect("equal", adjustable="box")
     axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.yaxis.set_major_locator(MaxNLocator(5))
-
-
-def note(axes: Axes, x: float, y: float, text: str, **style: Any) -> Any:
-    """Write a remark in a panel, at a place in axes fractions, on a background that keeps it readable."""
-    ground = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "boxstyle": "round,pad=0.2"}
-    options: dict[str, Any] = {
-        "ha": "center", "va": "center", "fontsize": 9.5, "color": INK, "zorder": 8, "bbox": ground,
-        "transform": axes.transAxes,
-    }  # fmt: skip
-    return axes.text(x, y, text, **(options | style))

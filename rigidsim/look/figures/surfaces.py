@@ -40,6 +40,15 @@ Mask = NDArray[np.bool_]
 _AROUND, _ALONG = 144, 72  # facets of a surface
 _LIGHT = (0.35, 0.25, 0.9)  # from where, in (right, up, towards) of the eye
 COLORS = (X, Y, Z)
+ENERGY_SURFACE, MOMENTUM_SURFACE = "#b9cde6", "#f0d3ae"
+SEPARATRIX = "#4a5568"
+_RING = "#8093ab"
+_VIEWS = [np.array(v) for v in ((0.74, 0.52, 0.43), (0.52, 0.74, 0.43), (0.45, 0.6, 0.66), (0.85, 0.3, 0.43))]
+_CLOSE = 0.06  # rad from an axis, within which facets are too coarse for the surfaces' meeting
+_GROUND, _LEVEL = "#dfe7f1", "#7f97b8"
+_LEVELS, _FINE = 12, 401  # levels, at equal shares of the sphere; points of the grid that they are found on
+_ONES = np.ones(3)
+_KINDS = ((-1, "o", Y, "stable"), (1, "X", X, "unstable"), (0, "D", GREY, "at the threshold"))
 
 
 @dataclass(frozen=True)
@@ -178,13 +187,6 @@ def frame(axes: Axes, covered: Array, *, aside: float = 0.42, above: float = 0.3
     axes.set_ylim(middle[1] - y, middle[1] + y)
     axes.set_aspect("equal", adjustable="box")
     axes.set_axis_off()
-
-
-ENERGY_SURFACE, MOMENTUM_SURFACE = "#b9cde6", "#f0d3ae"
-SEPARATRIX = "#4a5568"
-_RING = "#8093ab"
-_VIEWS = [np.array(v) for v in ((0.74, 0.52, 0.43), (0.52, 0.74, 0.43), (0.45, 0.6, 0.66), (0.85, 0.3, 0.43))]
-_CLOSE = 0.06  # rad from an axis, within which facets are too coarse for the surfaces' meeting
 
 
 def surfaces(dataset: xarray.Dataset) -> tuple[Array, Array] | None:
@@ -340,12 +342,6 @@ def draw_poinsot(axes: Axes, dataset: xarray.Dataset, found: tuple[Array, Array,
     key(axes, "It rolls on the invariable plane (Poinsot)", handles=entries)
 
 
-_GROUND, _LEVEL = "#dfe7f1", "#7f97b8"
-_LEVELS, _FINE = 12, 401  # levels, at equal shares of the sphere; points of the grid that they are found on
-_ONES = np.ones(3)
-_KINDS = ((-1, "o", Y, "stable"), (1, "X", X, "unstable"), (0, "D", GREY, "at the threshold"))
-
-
 @dataclass(frozen=True)
 class Sphere:
     """The momentum's directions (rows, 3), and the gyrostat whose levels are drawn, with a title."""
@@ -375,7 +371,7 @@ def sphere(row: int) -> Callable[[xarray.Dataset], Sphere | None]:
 
 def draw_sphere(axes: Axes, dataset: xarray.Dataset, found: Sphere) -> None:
     """Levels of the energy, separatrices, equilibria, and the path of the run."""
-    gyrostat, view = found.gyrostat, _sphere_view(dataset, found.directions)
+    gyrostat, view = found.gyrostat, _sphere_view(found.directions)
     covered = draw_ellipsoid(axes, view, _ONES, _GROUND)
     grid = np.linspace(-1, 1, _FINE)
     right, up = np.meshgrid(grid, grid)
@@ -417,20 +413,6 @@ def draw_sphere(axes: Axes, dataset: xarray.Dataset, found: Sphere) -> None:
     key(axes, found.title, handles=entries)
 
 
-def _sphere_view(dataset: xarray.Dataset, directions: Array) -> Eye:
-    """A view of most equilibria, at the start and the end, of the path, and of positive axes."""
-    spheres = [Gyrostat.of(dataset, row) for row in (0, -1)]
-    marked = [one for sphere in spheres if sphere is not None for one in sphere.equilibria]
-    best, found = -np.inf, np.array([0.74, 0.52, 0.43])
-    for azimuth in np.deg2rad(np.arange(7.5, 360.0, 15.0)):
-        for height in np.deg2rad((-25.0, 18.0, 28.0, 38.0)):
-            flat = np.cos(height)
-            toward = np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(height)])
-            seen = np.clip(directions @ toward, -0.3, 0.7)
-            quality = 4 * float(np.nanmean(seen) + np.clip(directions[0] @ toward, -0.3, 0.6))
-            for one in marked:
-                quality += (1.5 if one.unstable else 1.0) * float(np.clip(one.direction @ toward, -0.2, 0.5))
-            quality += 0.2 * float(toward.sum()) - float(np.abs(toward).max() > 0.9)
-            if quality > best:
-                best, found = quality, toward
-    return eye_at(found)
+def _sphere_view(directions: Array) -> Eye:
+    """A view of the path, of its start, and of positive axes."""
+    return eye_at(np.nanmean(directions, axis=0) + 0.5 * directions[0] + np.array([0.5, 0.3, 0.4]))

@@ -45,7 +45,7 @@ FIGURE: Color = (120, 165, 255)
 @dataclass(frozen=True)
 class Arrow:
     """A vector along time: (rows, 3) in stage units, from the reference point, fixed to space or the body.
-    Those with `words` are in the legend; the label stands at so many lengths.
+    Those with `words` are in the legend; the label stands at so many lengths, with a ball of some radius.
     """
 
     name: str
@@ -56,6 +56,7 @@ class Arrow:
     words: str = ""
     label_at: float = 1.07
     radius: float = 0.024
+    ball: float = 0.0
 
     @cached_property
     def stride(self) -> int:

@@ -28,7 +28,6 @@ from rigidsim.look.stages.parts import (
     Color,
     Line,
     Picture,
-    Solid,
     Spot,
     Stage,
     Trail,
@@ -45,8 +44,19 @@ _UNKNOWN: Color = (128, 148, 170)
 EQUATOR: Color = (150, 205, 110)
 _X_AXIS_WEST = {"earth_rigid": 14.93}  # deg from Greenwich, of presets whose x axis is that of least moment
 _SUN, _MOON = 0.11, 0.07  # radii of the balls that stand for sources, in radii of the globe
-_AWAY = 0.2  # of an arrow's length, by which its label stands beyond the ball
-_OPPOSITE = 1e-6
+ECLIPTIC: Color = (226, 196, 90)
+PRECESSION: Color = (190, 150, 255)
+POLE_REACH = 1.45  # length of a pole's arrow, in units of the body's reach
+SOURCE_REACH = 1.75  # length of an arrow to a source
+PLANE = "plane"  # frame of the plane of reference, where that isn't XY of space
+_MONTH = 27.3 * DAY
+_ALMOST_WHOLE = 0.98  # of a revolution, from which it counts as one: the last sample may be short of it
+_APART = 0.02  # rad, from which two arrows are told apart
+_UPRIGHT = 1e-9  # sine of the tilt, below which a pole has no node
+_SPARSE = 1.0  # rad of an orbit from one row to the next, from which a source can't be followed
+EYE = "eye"
+_LIFT = 1.012  # of the point under the source, in radii
+_MARK = 0.03  # radius of the ring about longitude and latitude zero
 
 
 def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
@@ -92,7 +102,6 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     circle_of_precession(dataset, stage, pole, "figure", notes)
     if turns:
         arrows = source_arrows(dataset, SOURCE_REACH)
-        stage.arrows.extend(arrows)
         stage = _with_balls(stage, arrows)
         if len(arrows) < len(scene_of(dataset).sources) and "source_position" in dataset:
             notes.append(
@@ -115,22 +124,9 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
 
 
 def _with_balls(stage: Stage, arrows: list[Arrow]) -> Stage:
-    """The sources as small balls at the tips of the arrows to them, the Sun larger; not to scale."""
-    frames, solids = dict(stage.frames), list(stage.solids)
-    for arrow in arrows:
-        way = arrow.vectors / signals.norms(arrow.vectors)[:, None]
-        # the least rotation from x to the direction; opposite to x about z
-        half = np.stack([1 + way[:, 0], 0 * way[:, 0], -way[:, 2], way[:, 1]], axis=1)
-        half[signals.norms(half) < _OPPOSITE] = (0.0, 0.0, 0.0, 1.0)
-        name = f"towards_{arrow.name}"
-        frames[name] = parts.viewer_quaternion(half)
-        radius = _SUN if arrow.label.endswith("Sun") else _MOON
-        far = float(np.nanmean(signals.norms(arrow.vectors))) + radius
-        ball = globe(np.full(3, radius), arrow.color).moved(np.eye(3), np.array([far, 0.0, 0.0]))
-        solids.append(Solid("ball", ball, name))
-    away = [replace(arrow, label_at=1.0 + _AWAY) for arrow in arrows]
-    kept = [arrow for arrow in stage.arrows if all(arrow is not one for one in arrows)]
-    return replace(stage, frames=frames, solids=solids, arrows=[*kept, *away])
+    """The stage with arrows to sources, which are small balls at the tips, the Sun larger; not to scale."""
+    balls = [replace(one, ball=_SUN if one.label.endswith("Sun") else _MOON, label_at=1.05) for one in arrows]
+    return replace(stage, arrows=[*stage.arrows, *balls])
 
 
 def _lines(half: Array, figure: Array, west: float, *, prime: bool) -> list[Line]:
@@ -197,18 +193,6 @@ def _in_its_own_axes(dataset: xarray.Dataset, stage: Stage, figure: Array, notes
         Trail("polar_motion", parts.POLHODE, shown, in_body=True, words="path of the spin axis")
     )
     notes.append(f"the angle between spin axis and figure axis is drawn {times} too large")
-
-
-ECLIPTIC: Color = (226, 196, 90)
-PRECESSION: Color = (190, 150, 255)
-POLE_REACH = 1.45  # length of a pole's arrow, in units of the body's reach
-SOURCE_REACH = 1.75  # length of an arrow to a source
-PLANE = "plane"  # frame of the plane of reference, where that isn't XY of space
-_MONTH = 27.3 * DAY
-_ALMOST_WHOLE = 0.98  # of a revolution, from which it counts as one: the last sample may be short of it
-_APART = 0.02  # rad, from which two arrows are told apart
-_UPRIGHT = 1e-9  # sine of the tilt, below which a pole has no node
-_SPARSE = 1.0  # rad of an orbit from one row to the next, from which a source can't be followed
 
 
 def axes_picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
@@ -376,11 +360,6 @@ def _whole_revolution(dataset: xarray.Dataset, span: float) -> bool:
         if span < _ALMOST_WHOLE * period:
             return False
     return True
-
-
-EYE = "eye"
-_LIFT = 1.012  # of the point under the source, in radii
-_MARK = 0.03  # radius of the ring about longitude and latitude zero
 
 
 def facing(dataset: xarray.Dataset, subject: Subject, figure: Array) -> tuple[Stage, str] | None:

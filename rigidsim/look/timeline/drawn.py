@@ -21,7 +21,7 @@ from rigidsim.look.stages.bodies import Subject
 from rigidsim.look.stages.parts import Picture, Stage, screen_seconds
 from rigidsim.look.stages.registry import build_picture
 from rigidsim.look.states import States, charts_of, states_of
-from rigidsim.look.thinning import by_extremes, thin, thinned_indices
+from rigidsim.look.thinning import thin_with_extremes, thinned_indices
 from rigidsim.look.timeline import entities
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.readable import DAY, YEAR, TimeWords, epoch_of
@@ -34,6 +34,7 @@ _EXACT = 4 * np.finfo(np.float64).eps
 _UNIX_EPOCH = Fraction(4881175, 2)  # Julian date of 1970-01-01
 _DATED_NANOSECONDS = 8.5e18  # from 1970, 270 years: what the viewer's calendar surely holds
 _RESOLUTION = 1e-3  # of the smallest step: what a tick of the timeline may be at most
+MOST_LEADING = 3  # plots beside the scene
 
 
 @dataclass(frozen=True)
@@ -130,14 +131,11 @@ class DrawnRun:
     @classmethod
     def of(cls, dataset: xarray.Dataset, most: int) -> Self:
         """The drawing of at most so many rows of a dataset, possibly lazy, on the clock that suits them."""
-        rows = thin(dataset, most).assign_attrs(dataset.attrs)
+        rows, curves = (x.assign_attrs(dataset.attrs) for x in thin_with_extremes(dataset, most))
         seconds = signals.seconds(rows)
         start, end = float(seconds[0]), float(seconds[-1])
         clock = dated(build_clock(seconds), epoch_of(rows.attrs))
         picture, subject = build_picture(rows)
-        curves = rows
-        if dataset.sizes["time"] > rows.sizes["time"]:
-            curves = by_extremes(dataset, most).assign_attrs(dataset.attrs)
         plots, paths = _about(rows, curves, picture)
         notes = list(picture.notes)
         if not clock.in_nanoseconds:
@@ -220,6 +218,3 @@ def _about(rows: xarray.Dataset, extremes: xarray.Dataset, picture: Picture) -> 
     others = other_plots(extremes, [plot.name for plot in first])
     paths = [path for name in planes if name in PATHS and (path := PATHS[name](rows)) is not None]
     return [*first, *others, *([drift] if drift else [])], paths
-
-
-MOST_LEADING = 3  # plots beside the scene

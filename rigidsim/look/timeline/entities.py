@@ -27,6 +27,14 @@ _EDGE: Color = (12, 14, 20)
 _AXIS_COLORS = [(235, 70, 60), (90, 200, 90), (80, 130, 250)]
 _CLEAR = 46  # of 255: of a cone, through which labels are read
 _DIM = 0.26  # of a trail's brightness: the whole curve
+PIXELS = 500  # about the width of a plot
+_SMOOTH = 0.01  # of a curve's range, by which it may move within a pixel
+CLOCK_ROWS = 2000  # largest number of rows of the clock on the screen
+_INK: Color = (205, 210, 218)
+_FAINT: Color = (90, 96, 108)
+LEGEND_COLUMNS = 3
+LEGEND_LINE = 0.78
+"""Height of a line of the legend, which is 30 units wide: about 24 of 950 points of the screen."""
 
 
 def trail_path(stage: Stage, trail: Trail) -> str:
@@ -57,7 +65,7 @@ def draw_static(recording: rr.RecordingStream, stages: Sequence[Stage]) -> None:
             style: list[rr.AsComponents] = [rr.Arrows3D.from_fields(colors=colors, radii=[arrow.radius])]
             if arrow.label:  # at its tip, of the same entity: an entity of its own would repeat every time
                 words: dict[str, Any] = {"labels": [arrow.label], "show_labels": True}
-                style.append(rr.Points3D.from_fields(colors=colors, radii=[0.0], **words))
+                style.append(rr.Points3D.from_fields(colors=colors, radii=[arrow.ball], **words))
             recording.log(_arrow_path(stage, arrow), *style, static=True)
         for trail in stage.trails:
             _draw_trail_static(recording, trail_path(stage, trail), trail)
@@ -246,16 +254,6 @@ def _arrow_path(stage: Stage, arrow: Arrow) -> str:
 
 def _cone_path(stage: Stage, cone: Cone) -> str:
     return f"/{stage.root}/{BODY}/{cone.name}"
-
-
-PIXELS = 500  # about the width of a plot
-_SMOOTH = 0.01  # of a curve's range, by which it may move within a pixel
-CLOCK_ROWS = 2000  # largest number of rows of the clock on the screen
-_INK: Color = (205, 210, 218)
-_FAINT: Color = (90, 96, 108)
-LEGEND_COLUMNS = 3
-LEGEND_LINE = 0.78
-"""Height of a line of the legend, which is 30 units wide: about 24 of 950 points of the screen."""
 
 
 def plot_path(plot: Plot) -> str:

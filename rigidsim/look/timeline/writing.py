@@ -29,6 +29,9 @@ LIVE_ROWS = 100_000
 CHUNK = 4096  # rows per chunk: larger ones make the viewer slow, smaller ones heavy
 _ROW_BYTES = 600  # at most: some twenty variables
 _FIRST_BYTES = 1024 * _ROW_BYTES  # bodies, layout, page
+MOST = 6  # largest number of runs shown side by side
+ROWS = 20_000  # largest number of rows shown of each run
+_FLOOR = 1e-18  # rad: below what a difference of attitudes in double precision can be
 
 
 def write_timeline(
@@ -145,11 +148,6 @@ def live_recording(address: str) -> Iterator[LiveRecording]:
     with rr.RecordingStream("rigidsim") as stream:
         stream.connect_grpc(address)
         yield LiveRecording(stream)
-
-
-MOST = 6  # largest number of runs shown side by side
-ROWS = 20_000  # largest number of rows shown of each run
-_FLOOR = 1e-18  # rad: below what a difference of attitudes in double precision can be
 
 
 def write_comparison(
