@@ -28,7 +28,6 @@ from rigidsim.look.solids import Array, Color
 from rigidsim.scene.bodies.presets import KNOWN, KnownBody, known_body
 
 Things = list[dict[str, Any]]
-VERSION = 1
 _ALIKE = 1e-9  # moments nearer than this are one
 _COLORS: dict[str, Color] = {
     "Sun": (255, 214, 110),

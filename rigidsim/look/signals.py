@@ -28,11 +28,6 @@ def title_of(dataset: xarray.Dataset) -> str:
     return str(dataset.attrs.get("title") or read_config(dataset).get("name") or "rigid body")
 
 
-def by_role(dataset: xarray.Dataset, role: str) -> dict[str, xarray.DataArray]:
-    """Drifts ("drift_of") or corrections put back ("put_back_of"), by the name of their invariant."""
-    return {name: v for v in dataset.data_vars.values() if (name := v.attrs.get(role))}
-
-
 def in_words(name: str) -> str:
     """A variable's name as people read it."""
     orbit = _ORBIT_NORM.fullmatch(name)
