@@ -101,24 +101,15 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     stage = on_reference_plane(dataset, stage)
     circle_of_precession(dataset, stage, pole, "figure", notes)
     if turns:
-        arrows = source_arrows(dataset, SOURCE_REACH)
-        stage = _with_balls(stage, arrows)
-        if len(arrows) < len(scene_of(dataset).sources) and "source_position" in dataset:
-            notes.append(
-                "directions are shown of sources whose tide is a thousandth of the strongest or more"
-            )
+        stage = _with_balls(stage, source_arrows(dataset, SOURCE_REACH))
     elif beside:
         notes.append("the plane of reference moves in space: the globe is drawn as seen from it")
     else:
         stage.arrows.extend(followed_sources(dataset, notes))
     if not turns:
         notes.append(standing_note(dataset, "globe"))
-    rates, seconds = signals.values(dataset, "angular_velocity", 3), signals.seconds(dataset)
-    if rates is not None and len(seconds) > 1:
-        step = float(np.nanmean(np.linalg.norm(rates, axis=1)) * np.abs(np.diff(seconds)).mean())
-        if step > 1.0:
-            words = "the globe's turning isn't seen between them"
-            notes.append(f"samples are {step:.3g} rad of rotation apart: {words}")
+    elif signals.aliased(dataset):
+        notes.append("samples are half a turn apart or more: the globe's turning isn't seen")
     stage = replace(stage, camera=eye_of_pole())
     return Picture(f"rotation of {called} in space", [*faces, stage], notes)
 

@@ -44,7 +44,8 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     ground, center = (-1.35 if post else 0.0) * up, np.zeros(3)
     across = _across(up)
     lines = [
-        *_ground(up, ground),
+        Line("ground/rim", parts.FAINT, parts.circle(1.6, up, ground), SPACE, 1.2, 0.8),
+        *parts.grid("ground", ground, *across, 1.6, 4, 0.4, round_=True),
         Line("vertical", parts.FAINT, np.stack([ground, 1.5 * up]), width=1.0, words="vertical"),
     ]
     # on a post the label is below, where it is clear of the body's own
@@ -101,21 +102,5 @@ def _symbol(dataset: xarray.Dataset, subject: Subject, arm: Array, axis: Array) 
 
 def _across(axis: Array) -> tuple[Array, Array]:
     """Two unit vectors that complete an axis to a right-handed frame; X and Y for Z."""
-    first = np.eye(3)[0] if abs(axis[2]) > 0.999 else np.cross(np.array([0.0, 0.0, 1.0]), axis)
-    first = first - axis * (first @ axis)
-    first /= np.linalg.norm(first)
-    return first, np.cross(axis, first)
-
-
-def _ground(up: Array, at: Array) -> list[Line]:
-    first, second = _across(up)
-    lines = [Line("ground/rim", parts.FAINT, parts.circle(1.6, up, at), SPACE, 1.2, 0.8)]
-    for radius in (0.4, 0.8, 1.2):
-        lines.append(
-            Line(f"ground/ring{radius:g}", parts.FAINT, parts.circle(radius, up, at), SPACE, 0.7, 0.4)
-        )
-    for k, way in enumerate((first, second, first + second, first - second)):
-        way = way / np.linalg.norm(way)
-        points = np.stack([at - 1.6 * way, at + 1.6 * way])
-        lines.append(Line(f"ground/spoke{k}", parts.FAINT, points, SPACE, 0.7, 0.4))
-    return lines
+    second, first = signals.across(axis)
+    return first, -second

@@ -27,9 +27,7 @@ _ON_DISC = 1.12  # where a globe is seen as a disc that fills the view
 _CORNERS = 72
 _ROUNDING = 1e-7  # of the uncertainty about the axis: the root of what rounding leaves of its square
 _NARROW, _WIDE = np.deg2rad(12.0), np.deg2rad(60.0)  # half-angles (rad) that are drawn as they are
-_WIDENED, _NARROWED = np.deg2rad(25.0), np.deg2rad(50.0)  # the largest (rad) that others are drawn with
-_STEPS = (1, 2, 3, 5, 10)
-_SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+_SHOWN = np.deg2rad(50.0)  # the largest (rad) that others are drawn with
 _TO_SCALE = 0.5  # reaches: a body drawn smaller is a mark on its orbit
 _LEADING = "figure_axis_uncertainty"
 
@@ -94,7 +92,7 @@ def with_cone(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Pi
         why = "none of the fitted numbers moves it" if np.isfinite(angles).any() else "it has no bounds"
         return replace(picture, notes=[*picture.notes, f"no uncertainty of the figure axis is drawn: {why}"])
     factor = drawn_factor(largest)
-    words = "1 sigma of the figure axis" + ("" if factor == 1 else f", drawn × {_factor_text(factor)}")
+    words = "1 sigma of the figure axis" + ("" if factor == 1 else f", drawn × {factor:g}")
     rim = np.nan_to_num(found.rim(factor))
     # the other side of a top's axis goes through the ground
     cone = Cone(_LEADING, COLOR, _REACH * rim, words, double=not signals.is_top(dataset))
@@ -121,28 +119,8 @@ def with_cone(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Pi
 
 
 def drawn_factor(largest: float) -> float:
-    """By what half-angles are multiplied of which the largest (rad) is given: 1, or 1, 2, 3, 5 times a power
-    of ten, or one over these.
-    """
-    if _NARROW <= largest <= _WIDE:
-        return 1.0
-    wider = largest < _NARROW
-    room = _WIDENED / largest if wider else largest / _NARROWED
-    decade = 10.0 ** np.floor(np.log10(room))
-    steps = [step * decade for step in _STEPS]
-    if wider:
-        return float(max(step for step in steps if step <= room))
-    return 1 / float(min(step for step in steps if step >= room))
-
-
-def _factor_text(factor: float) -> str:
-    """A factor in few letters: ``200``, ``2·10⁸`` or ``1/5``."""
-    if factor < 1:
-        return f"1/{_factor_text(1 / factor)}"
-    if factor < 1e6:
-        return f"{factor:,.0f}"
-    digit, _, power = f"{factor:.0e}".partition("e")
-    return f"{digit}·10{str(int(power)).translate(_SUPERSCRIPTS)}"
+    """By what half-angles are multiplied of which the largest (rad) is given: 1, or a power of ten."""
+    return 1.0 if _NARROW <= largest <= _WIDE else float(10.0 ** np.floor(np.log10(_SHOWN / largest)))
 
 
 def _to_scale(stage: Stage) -> bool:
