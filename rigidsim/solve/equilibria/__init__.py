@@ -10,11 +10,12 @@ from functools import partial
 from typing import Any
 
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.starts import ATTITUDES, EQUILIBRIA, InitialRotation, StartForm, register_start
+from rigidsim.scene.starts import ATTITUDES, EQUILIBRIA, InitialRotation, StartForm, refusal, register_start
 from rigidsim.scene.tracing.arithmetic import TracingContext
 from rigidsim.scene.tracing.numbers import Untraceable
 from rigidsim.solve.equilibria.cassini import cassini_state
 from rigidsim.solve.equilibria.relative import relative_equilibrium
+from rigidsim.solve.equilibria.search import NoEquilibrium
 
 _KEPT = 64
 _BESIDE = ("name", "description", "integrator", "model", "output", "limits", "sweep", "events")
@@ -22,13 +23,17 @@ _BESIDE = ("name", "description", "integrator", "model", "output", "limits", "sw
 _known: OrderedDict[Any, InitialRotation] = OrderedDict()
 
 
-def _once(find: Callable[[Scene], InitialRotation], scene: Scene) -> InitialRotation:
+def _once(name: str, find: Callable[[Scene], InitialRotation], scene: Scene) -> InitialRotation:
     if isinstance(scene.context, TracingContext):
         raise Untraceable("an equilibrium that is found")
     tables = {name: table for name, table in scene.config if name not in _BESIDE}
     key = scene.context.prec, repr(tables)
     if key not in _known:
-        _known[key] = find(scene)
+        try:
+            _known[key] = find(scene)
+        except NoEquilibrium as none:
+            remedy = "" if ";" in str(none) else "; give the attitude and rates themselves"
+            raise refusal("equilibrium", f'given "{name}", but {none}{remedy}') from None
         while len(_known) > _KEPT:
             _known.popitem(last=False)
     found, own = _known[key], scene.context.make_mpf
@@ -39,7 +44,7 @@ def _once(find: Callable[[Scene], InitialRotation], scene: Scene) -> InitialRota
 
 
 def _enter(name: str, find: Callable[[Scene], InitialRotation], allowed: tuple[str, ...]) -> None:
-    register_start(EQUILIBRIA, StartForm("equilibrium", partial(_once, find), allowed=allowed), name)
+    register_start(EQUILIBRIA, StartForm("equilibrium", partial(_once, name, find), allowed=allowed), name)
 
 
 _enter("relative", relative_equilibrium, (*ATTITUDES, "prime_meridian", "node_longitude"))

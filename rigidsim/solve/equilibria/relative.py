@@ -27,6 +27,7 @@ from rigidsim.scene.arithmetic import (
     Vector,
     apply,
     cross,
+    dot,
     multiply,
     negligible,
     norm,
@@ -35,18 +36,25 @@ from rigidsim.scene.arithmetic import (
 )
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.starts import ATTITUDES, InitialRotation, refusal
-from rigidsim.solve.equilibria.motion import Pose, PoseMotion, widths
-from rigidsim.solve.equilibria.newton import Newton, NotFound, exponents_of, jacobian
+from rigidsim.scene.starts import ATTITUDES, InitialRotation
+from rigidsim.solve.equilibria.search import (
+    Newton,
+    NoEquilibrium,
+    Pose,
+    PoseMotion,
+    exponents_of,
+    jacobian,
+    widths,
+)
 from rigidsim.store.summary import FoundStart
 
-_KEY = "equilibrium"
 _ROUNDS = 40
 _STILL = 1e-9
 """Part of the orbit's rate below which a part of an exponent is zero: equal ones lose half of theirs."""
 _AT = 1e-9  # rad from one of the 24 attitudes
 _FAR = 1.0  # rad from the attitude that Newton's method begins at
 _LATER = "0.3819660112501051"  # of a revolution, at which loads that rest in the frame are the same
+_RESTS = "1e-12"  # part of the orbit's rate squared, or rate of a state, that counts as rest
 _NAMES = ("the axis of least moment", "the middle axis", "the axis of largest moment")
 
 
@@ -54,10 +62,9 @@ def relative_equilibrium(scene: Scene) -> InitialRotation:
     """The relative equilibrium nearest to the attitude given, or without one the stable one.
 
     Raises:
-        ConfigError: the scene has none, or none was found.
+        NoEquilibrium: the scene has none, or none was found.
     """
-    context, orbit = scene.context, _orbit(scene)
-    precision = widths(scene)[-1]
+    context, orbit, precision = scene.context, _orbit(scene), widths(scene)[-1]
     frame = _frame(orbit, context, scene.start)
     rates = [orbit.mean_motion * x for x in frame[2]]
     begun, order = _nearest(scene, frame)
@@ -75,30 +82,38 @@ def relative_equilibrium(scene: Scene) -> InitialRotation:
     for _ in range(_ROUNDS):  # momenta of rotors in the equations depend on the rates that they begin with
         here, before = PoseMotion(scene, precision, found), size
         if not here.plain:
-            what = 'given "relative", but a load has a kink or jump, or happens at a moment; give attitude '
-            raise refusal(_KEY, f"{what}and rates themselves")
+            raise NoEquilibrium("a load has a kink or jump, or happens at a moment")
         size = norm(context, residual(found))
         if size <= context.ldexp(1, 24 - precision.bits) or size >= before:
             break
         try:
             found = Newton(context, precision.bits, residual, moved, 3).settled(found)
-        except NotFound:
-            what = 'given "relative", but none was found near that attitude; give another one to begin at'
-            raise refusal(_KEY, what) from None
-    away = _angle(context, begun, found.matrix)
+        except NoEquilibrium:
+            what = "none was found near that attitude; give another one to begin at"
+            raise NoEquilibrium(what) from None
+    w, *vector = attitude.quaternion_from_matrix(context, multiply(transpose(begun), found.matrix))
+    away = 2 * context.atan2(norm(context, vector), abs(w))
+    degrees = context.nstr(context.degrees(away), 4)
     if away > _FAR:
-        degrees = context.nstr(context.degrees(away), 3)
         what = (
-            f'given "relative", but the nearest one is {degrees} deg from where the gradient alone has one: '
+            f"the nearest one is {degrees} deg from where the gradient alone has one: the other loads are too"
         )
-        raise refusal(_KEY, f"{what}the other loads are too strong; give attitude and rates themselves")
+        raise NoEquilibrium(f"{what} strong")
     _refuse_passing(scene, precision, orbit, found, here)
     matrix = _linear(context, here, found, precision.bits)
     exponents, stable = exponents_of(context, matrix, orbit.mean_motion * context.mpf(_STILL))
+    first, _, last = (_NAMES[k] for k in order)
+    near, said = f"{degrees} deg from ", "stable" if stable else "unstable"
+    how = "by Newton's method on the full equations, of which it is an exact solution"
+    if away < _AT:
+        near, how = "", "as one of the gradient's 24 attitudes, an exact solution of the full equations"
+        why = " (least dynamic potential)" if order == (0, 1, 2) else " (by gyroscopic torques alone)"
+        said += why if stable else ""
+    described = f"{near}{first} towards the source and {last} along the orbit's normal: {said}"
     told = FoundStart(
         name="relative",
-        described=_described(order, stable, away),
-        how=_how(away),
+        described=f"relative equilibrium, {described}",
+        how=how,
         exponents=exponents,
         stable=stable,
     )
@@ -106,36 +121,28 @@ def relative_equilibrium(scene: Scene) -> InitialRotation:
 
 
 def _orbit(scene: Scene) -> KeplerOrbit:
-    loads = loads_of(scene)
+    """The orbit in whose frame the body may rest."""
+    context, loads, moments = scene.context, loads_of(scene), scene.body.principal_moments
     orbits = [orbit for load in loads if (orbit := load.orbit) is not None]
-    given = 'given "relative", but '
-    if not orbits or scene.free_flight:
-        what = "no load has a source on an orbit (gravity_gradient with orbit)"
-        if scene.free_flight:
-            what = "the body flies on another orbit, and this is for a prescribed one"
-        raise refusal(_KEY, f"{given}{what}; give the attitude and rates themselves")
+    if scene.free_flight:
+        raise NoEquilibrium("the body flies on another orbit, and this is for a prescribed one")
+    if not orbits:
+        raise NoEquilibrium("no load has a source on an orbit (gravity_gradient with orbit)")
     if any(load.changes for load in loads):
-        what = "the body's moments vary, and its equilibria with them"
-        raise refusal(_KEY, f"{given}{what}; give the attitude and rates themselves")
-    moments = scene.body.principal_moments
-    if max(moments) - min(moments) <= max(moments) * negligible(scene.context):
-        what = "a body whose moments are all the same rests in any attitude, or in none"
-        raise refusal(_KEY, f"{given}{what}; give the attitude and rates themselves")
+        raise NoEquilibrium("the body's moments vary, and its equilibria with them")
+    if max(moments) - min(moments) <= max(moments) * negligible(context):
+        raise NoEquilibrium("a body whose moments are all the same rests in any attitude, or in none")
     first = orbits[0]
     if not first.circular:
-        size = scene.context.nstr(first.eccentricity, 6)
-        what = f"the orbit's eccentricity is {size}, and a body rests only relative to a circle; "
-        raise refusal(_KEY, f"{given}{what}set it to 0, or give attitude and rates")
+        size = context.nstr(first.eccentricity, 6)
+        what = f"the orbit's eccentricity is {size}, and a body rests only relative to a circle; set it to 0"
+        raise NoEquilibrium(f"{what}, or give attitude and rates")
     if not first.fixed_plane:
-        raise refusal(_KEY, f'{given}the orbit\'s node moves; choose "cassini_1" to "cassini_4"')
-    normal = first.normal(scene.context)
-    turning = [orbit for load in loads if (orbit := load.corotating_orbit) is not None]
-    for orbit in orbits:
-        same = orbit in turning and orbit.mean_motion == first.mean_motion
-        if not same or not parallel(scene.context, orbit.normal(scene.context), normal):
-            raise refusal(
-                _KEY, f"{given}the sources are on different orbits, so that nothing rests between them"
-            )
+        raise NoEquilibrium('the orbit\'s node moves; choose "cassini_1" to "cassini_4"')
+    normal, turning = first.normal(context), [load.corotating_orbit for load in loads]
+    alike = (orbit in turning and orbit.mean_motion == first.mean_motion for orbit in orbits)
+    if not all(alike) or not all(parallel(context, orbit.normal(context), normal) for orbit in orbits):
+        raise NoEquilibrium("the sources are on different orbits, so that nothing rests between them")
     return first
 
 
@@ -164,41 +171,26 @@ def _nearest(scene: Scene, frame: Matrix) -> tuple[Matrix, tuple[int, ...]]:
                 for s, k in zip(signs, order[::2], strict=True)
             )
             matrix = multiply(transpose(frame), [first, cross(last, first), last])
-            trace = sum(
-                a * b
-                for row, other in zip(matrix, wanted, strict=True)
-                for a, b in zip(row, other, strict=True)
-            )
+            trace = sum(dot(row, other) for row, other in zip(matrix, wanted, strict=True))
             # without an attitude given, the axes themselves and not their opposites
             found.append((trace if given else sum(signs), matrix, order))
     return max(found, key=lambda entry: entry[0])[1:]
 
 
-def _angle(context: Any, a: Matrix, b: Matrix) -> Any:
-    """Angle (rad) of the rotation between two attitudes."""
-    w, *vector = attitude.quaternion_from_matrix(context, multiply(transpose(a), b))
-    return 2 * context.atan2(norm(context, vector), abs(w))
-
-
 def _refuse_passing(scene: Scene, precision: Any, orbit: KeplerOrbit, found: Pose, here: PoseMotion) -> None:
     """Refuse loads that don't rest in the turning frame, and states beside the rotation that do not."""
-    context, n = scene.context, orbit.mean_motion
+    context, n, least = scene.context, orbit.mean_motion, scene.context.mpf(_RESTS)
     seconds = 2 * context.pi / n * context.mpf(_LATER)
-    later = PoseMotion(replace(scene, start=scene.start + seconds, end=scene.end + seconds), precision, found)
-    turn = multiply(
-        transpose(_frame(orbit, context, scene.start + seconds)), _frame(orbit, context, scene.start)
-    )
+    start = scene.start + seconds
+    later = PoseMotion(replace(scene, start=start, end=scene.end + seconds), precision, found)
+    turn = multiply(transpose(_frame(orbit, context, start)), _frame(orbit, context, scene.start))
     there = Pose(multiply(turn, found.matrix), found.rates)
-    size = norm(context, later.acceleration(there)[0]) / n**2
-    if size > context.mpf(10) ** -12:
-        what = 'given "relative", but a load changes relative to the turning frame (it depends on time, or is'
-        raise refusal(
-            _KEY, f"{what} fixed in space): nothing rests there; give the attitude and rates themselves"
-        )
+    if norm(context, later.acceleration(there)[0]) / n**2 > least:
+        what = "a load changes relative to the turning frame (it depends on time, or is fixed in space)"
+        raise NoEquilibrium(f"{what}: nothing rests there")
     for name, slope in here.acceleration(found)[1].items():
-        if abs(slope) > context.mpf(10) ** -12:
-            what = f'given "relative", but the state {name} changes in it; start it where it rests'
-            raise refusal(_KEY, what)
+        if abs(slope) > least:
+            raise NoEquilibrium(f"the state {name} changes in it; start it where it rests")
 
 
 def _linear(context: Any, motion: PoseMotion, at: Pose, bits: int) -> Matrix:
@@ -216,20 +208,3 @@ def _linear(context: Any, motion: PoseMotion, at: Pose, bits: int) -> Matrix:
         turning = [cross(unit, at.rates)[i] for unit in units]
         above.append([*turning, *units[i]])
     return above + below
-
-
-def _described(order: tuple[int, ...], stable: bool, away: Any) -> str:
-    first, _, last = (_NAMES[k] for k in order)
-    said = "stable" if stable else "unstable"
-    if stable and away < _AT:
-        said += " (least dynamic potential)" if order == (0, 1, 2) else " (by gyroscopic torques alone)"
-    near = "" if away < _AT else f"{float(away) * 57.29577951308232:.4g} deg from "
-    return (
-        f"relative equilibrium, {near}{first} towards the source and {last} along the orbit's normal: {said}"
-    )
-
-
-def _how(away: Any) -> str:
-    if away < _AT:
-        return "as one of the gradient's 24 attitudes, an exact solution of the full equations"
-    return "by Newton's method on the full equations, of which it is an exact solution"
