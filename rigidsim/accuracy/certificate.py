@@ -1,7 +1,7 @@
 """Certified accuracy of a run: its attitude against an independent, better solution at a set of times.
 
 The certified error is the largest difference found, plus a margin for the times between those compared, plus
-the reference's own error (``rigidsim.accuracy.reference``).
+the reference's own error (``rigidsim.accuracy.motion``).
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ from rigidsim.accuracy.comparison import (
     parts_of,
     rows_to_compare,
 )
-from rigidsim.accuracy.motion import KnownMotion, motion_of
-from rigidsim.accuracy.reference import references, scatter_of
+from rigidsim.accuracy.motion import KnownMotion, motion_of, references, scatter_of
 from rigidsim.accuracy.setting import Setting, setting_of
 from rigidsim.accuracy.trial import TrialProgress, Trials, try_setting
 from rigidsim.model.load import Load

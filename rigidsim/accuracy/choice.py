@@ -18,8 +18,7 @@ from dataclasses import dataclass, replace
 from rigidsim.accuracy.comparison import spread_times
 from rigidsim.accuracy.error_law import CLOSED_FORM
 from rigidsim.accuracy.modelling import Unmeasured, measure_modelling
-from rigidsim.accuracy.motion import PILOT_STEPS, KnownMotion, motion_of
-from rigidsim.accuracy.reference import stepped_reference
+from rigidsim.accuracy.motion import PILOT_STEPS, KnownMotion, motion_of, stepped_reference
 from rigidsim.accuracy.setting import (
     STEP_SECONDS,
     Setting,

@@ -31,25 +31,19 @@ def stable_law(tolerance: float, steps: int, rate: float, duration: float) -> fl
     return math.hypot(walk, round_off_law(tolerance, steps, rate, duration))
 
 
-def attitude_error(level: float, steps: int, rate: float, seconds: float, amplification: float) -> float:
-    """The law of stable motions times the motion's amplification, rad, for errors of size ``level`` at each
-    step.
-    """
-    return stable_law(level, steps, rate, seconds) * amplification
-
-
 def held_error(
     prepared: InitialValueProblem, steps: int, rate: float, seconds: float, amplification: float
 ) -> float:
-    """The same where invariants are projected on the way, of a motion whose frequencies depend on them alone
-    (one with a closed form); never above the plain run's.
+    """The law of stable motions times the motion's amplification, rad, where invariants are projected on the
+    way, of a motion whose frequencies depend on them alone (one with a closed form); never above the plain
+    run's.
 
     Corrections k steps apart leave the frequencies off by the wander in between, eps sqrt(k), whose part over
     the ends is taken back: eps k sqrt(n / 12) after n steps. Where they begin late, what rounding did to the
     phase until then comes on top.
     """
     level = prepared.law_tolerance
-    plain = attitude_error(level, steps, rate, seconds, amplification)
+    plain = stable_law(level, steps, rate, seconds) * amplification
     late = prepared.holds_late
     if not prepared.holds_invariants or steps <= (LATE if late else 0):
         return plain

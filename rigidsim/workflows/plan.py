@@ -10,9 +10,9 @@ import numpy as np
 
 from rigidsim.accuracy.choice import choose_level, chosen
 from rigidsim.accuracy.error_law import (
-    attitude_error,
     closed_form_if_any,
     held_error,
+    stable_law,
 )
 from rigidsim.accuracy.motion import growth_of
 from rigidsim.model.equation_text import equation_texts
@@ -224,7 +224,7 @@ def plan(
     warnings = [(str(caution.code), caution.text) for caution in cautions_of(prepared.scene)]
     if room.problem is not None:
         warnings.append(("disk_space", f"the run {room.problem}"))
-    error: float | None = attitude_error(prepared.law_tolerance, int(steps), rate, duration, amplification)
+    error: float | None = stable_law(prepared.law_tolerance, int(steps), rate, duration) * amplification
     if held:
         error = held_error(prepared, int(steps), rate, duration, amplification)
     if not system.requirements.attitude or prepared.algorithm.own_errors:

@@ -34,8 +34,7 @@ import numpy as np
 
 from rigidsim.accuracy.comparison import angles_between
 from rigidsim.accuracy.error_law import closed_form_if_any
-from rigidsim.accuracy.motion import run_pilot
-from rigidsim.accuracy.reference import LEAST_DIGITS
+from rigidsim.accuracy.motion import LEAST_DIGITS, run_pilot
 from rigidsim.accuracy.setting import Setting, cost, epsilon
 from rigidsim.accuracy.trial import Trial, trial_scene, try_setting
 from rigidsim.errors import ConfigError, RigidsimError
