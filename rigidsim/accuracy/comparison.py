@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise, zip_longest
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import mpmath
@@ -23,24 +23,20 @@ def angles_between(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np
 
     Small angles keep their digits: parts are subtracted before anything is rounded.
     """
-    lead = np.einsum("ij,ij->i", one[0], other[0])
-    sign = np.where(lead < 0, -1.0, 1.0)[:, None]
-    terms = [*one, *(-sign * b for b in other)]
-    if len(terms) <= 4:
-        pairs = zip_longest(one, other, fillvalue=np.zeros_like(one[0]))
-        difference = sum((a - sign * b for a, b in pairs), np.zeros_like(one[0]))
-    else:  # differences of single parts are rounded at 1e-32 already
-        difference = np.array([math.fsum(row) for row in np.stack(terms, axis=-1).reshape(-1, len(terms))])
-        difference = difference.reshape(one[0].shape)
-    chord = np.linalg.norm(difference, axis=1)
-    return 4 * np.arcsin(np.minimum(chord / 2, 1.0))
+    opposite = np.einsum("ij,ij->i", one[0], other[0]) < 0
+    sign = np.where(opposite, -1.0, 1.0)[:, None]
+    chord = np.linalg.norm(_differences(one, [sign * part for part in other]), axis=1)
+    return np.asarray(4 * np.arcsin(np.minimum(chord / 2, 1.0)))
 
 
 def distances_between(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.ndarray:
     """Distances (n,) between positions given as float64 parts (n, 3), subtracted before rounding."""
+    return np.asarray(np.linalg.norm(_differences(one, other), axis=1))
+
+
+def _differences(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.ndarray:
     rows = np.stack([*one, *(-part for part in other)], axis=-1)
-    apart = [[math.fsum(parts) for parts in row] for row in rows]
-    return np.asarray(np.linalg.norm(np.array(apart).reshape(-1, 3), axis=1))
+    return np.array([[math.fsum(parts) for parts in row] for row in rows]).reshape(one[0].shape)
 
 
 def spread_times(experiment: Experiment, count: int, until: float = 1.0) -> list[mpmath.mpf]:
