@@ -40,7 +40,7 @@ QUICK = {
     "resume runs/grown --until 4 --json": 0,
     "resume runs/stopped --set limits.max_steps=100000 --json": 0,
     "resume runs/swept --workers 1 --json": 0,
-    "verify runs/free --json": 0,
+    "verify runs/free --reversed --json": 0,
     "verify runs/swept --members 1 --json": 0,
     "plan free.toml --set time.end=2 --out runs --json": 0,
     "plan swept.toml --json": 0,

@@ -123,7 +123,7 @@ def test_check(config: Config, rigidsim_command: Command) -> None:
     assert first["problems"][0]["where"] == "[body] principal_moments"
     assert first["body"] is first["start"] is None
     assert second["start"]["euler_sequence"] == "zxz"
-    assert rigidsim_command("check", good, "--set", "time.end=-1").exit_code == 2
+    assert rigidsim_command("check", good, "--set", "time.end=0").exit_code == 2
     assert rigidsim_command("check", "nowhere.toml").exit_code == 2
     assert rigidsim_command("check").exit_code == 2
     assert sorted(path.name for path in Path().iterdir()) == ["bad.toml", "good.toml"]  # nothing is written
