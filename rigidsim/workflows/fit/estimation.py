@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
@@ -144,13 +143,10 @@ class Ended:
     barred: bool = False
 
 
-class Linearised(Protocol):
-    """The fit at some values, with derivatives there if they are to be ``fresh``, otherwise with the latest;
-    None where the motion can't be computed.
-    """
-
-    def __call__(self, values: np.ndarray, fresh: bool = True) -> Linear | None:
-        """See the class."""
+Linearised = Callable[..., Linear | None]
+"""The fit at some values, with derivatives there if they are to be ``fresh`` (by default), otherwise with the
+latest ones; None where the motion can't be computed.
+"""
 
 
 def _rounding_is_left(linear: Linear, solution: Solution) -> bool:
@@ -161,7 +157,7 @@ def _rounding_is_left(linear: Linear, solution: Solution) -> bool:
 def iterate(
     begin: np.ndarray,
     linearised: Linearised,
-    told: Callable[[int, float, float], None] = lambda iteration, cost, step: None,
+    told: Callable[[str], None] = lambda _: None,
     most: int = MOST_ITERATIONS,
 ) -> Ended | None:
     """Damped Gauss-Newton steps until they are shorter than ``WITHIN`` sigmas.
@@ -172,7 +168,7 @@ def iterate(
 
     Args:
         begin: (estimated,) first values.
-        told: receives number, cost and undamped step (sigmas) of each iteration.
+        told: receives a line on each iteration.
 
     Returns:
         Where it ended; None if the motion can't be computed at the first values.
@@ -183,9 +179,9 @@ def iterate(
     solution, iterations, settled = Solution(linear), 1, False
     damping, growth, calm = _FIRST_DAMPING, 2.0, _CALM
     barred = -_LATELY  # the latest evaluation without a motion
-    told(iterations, linear.cost, solution.step_sigmas)
     while iterations < most and damping < _LARGEST_DAMPING:
         before, trial = solution.step_sigmas, None
+        told(f"evaluation {iterations}: sum of squares {linear.cost:.6g}, next step {before:.2g} sigmas")
         settled = settled or before <= WITHIN
         if settled and fresh:
             break
@@ -205,7 +201,6 @@ def iterate(
             values, linear, fresh = values + step, trial, last
             solution = Solution(linear)
             if fresh or solution.step_sigmas <= _SHORTER * before:
-                told(iterations, linear.cost, solution.step_sigmas)
                 continue
         elif fresh:
             settled = rounded and _rounding_is_left(linear, solution)  # otherwise damping keeps it here
@@ -214,7 +209,6 @@ def iterate(
             continue
         linear, fresh, settled = _there(linearised, values), True, False
         solution = Solution(linear)
-        told(iterations, linear.cost, solution.step_sigmas)
     if not fresh:
         linear = _there(linearised, values)
         solution = Solution(linear)

@@ -55,9 +55,7 @@ class FitKeys:
 
     def __init__(self, experiment: Experiment) -> None:
         table = experiment.config.fit
-        if table is None:
-            what = "missing; it names parameters and data, see docs/fits.md"
-            raise ConfigError(Problem("[fit]", what), experiment.source)
+        assert table is not None
         self._experiment = experiment
         self._tables = parse_toml(experiment.text, experiment.source)
         self.scene = build_scene(experiment)

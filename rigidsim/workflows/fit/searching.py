@@ -166,7 +166,7 @@ def search(weighing: Weighing, starts: int, told: Callable[[str], None]) -> Foun
         rounds += 1
         left = sum(int((~used).sum()) for used in weighing.used)
         told(f"round {rounds} of the outlier rule: {left} rows left out")
-        again = iterate(ended.values, weighing.linearised, _telling(told))
+        again = iterate(ended.values, weighing.linearised, told)
         if again is None:
             raise RigidsimError(f"fit: {weighing.failure}")
         ended, compared = again, weighing.compared(again.values, fresh=False)
@@ -191,7 +191,7 @@ def _from_starts(
         if starts > 1:
             told(f"start {number + 1} of {starts}")
         most = {} if starts == 1 else {"most": _FROM_START}
-        ended = iterate(values, weighing.linearised, _telling(told), **most)
+        ended = iterate(values, weighing.linearised, told, **most)
         costs.append(np.nan if ended is None else ended.linear.cost)
         if ended is not None and (best is None or ended.linear.cost < best.linear.cost * (1 - _ROUNDED)):
             best = ended
@@ -234,10 +234,3 @@ def _sort_out(weighing: Weighing, compared: Residuals) -> bool:
         changed |= bool((used != weighing.used[n]).any())
         weighing.used[n] = used
     return changed
-
-
-def _telling(told: Callable[[str], None]) -> Callable[[int, float, float], None]:
-    def tell(iteration: int, cost: float, step: float) -> None:
-        told(f"evaluation {iteration}: sum of squares {cost:.6g}, next step {step:.2g} sigmas")
-
-    return tell
