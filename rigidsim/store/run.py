@@ -42,6 +42,14 @@ class Run:
         return self.outcome.status
 
     @property
+    def attitude_error(self) -> float | None:
+        """Certified or estimated error of the attitude at the end, rad; None if unknown."""
+        if not isinstance(self.outcome, Summary):
+            return None
+        accuracy = self.outcome.accuracy
+        return accuracy.estimated_attitude_error if accuracy.certified is None else accuracy.certified
+
+    @property
     @abstractmethod
     def place(self) -> str:
         """Description of where the run is kept."""

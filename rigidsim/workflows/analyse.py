@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -74,7 +73,7 @@ def analyse(
         source = open_any(source)
     if isinstance(source, Run):
         with source.dataset as dataset:
-            options["attitude_error"] = _attitude_error(source)
+            options["attitude_error"] = source.attitude_error
             return _analysed(dataset, chosen, known, options)
     return _analysed(source, chosen, known, options)
 
@@ -105,16 +104,6 @@ def _scene(dataset: xarray.Dataset) -> Scene | None:
         return build_scene(parse(text, source="the dataset's config"))
     except ConfigError:  # the config is of another version: the numbers are valid all the same
         return None
-
-
-def _attitude_error(run: Run) -> float | None:
-    """Attitude error of the run at its end, as certified or estimated, rad; None if unknown."""
-    accuracy = getattr(run.outcome, "accuracy", None)
-    for name in ("certified", "estimated_attitude_error"):
-        value = getattr(accuracy, name, None)
-        if value is not None and math.isfinite(value):
-            return float(value)
-    return None
 
 
 @dataclass(frozen=True)

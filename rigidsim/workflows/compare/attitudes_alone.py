@@ -12,8 +12,6 @@ errors of short equal steps are nearly one, if accelerations of more forms are a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from rigidsim.scene.row_rotations import conjugated, multiplied, normalised, turned, vector_of
@@ -38,53 +36,36 @@ _EXPLAINED = 1e-4  # share of the defects that is nothing
 _RANKS = (1e-4, 1e-3, 1e-2)  # of singular values, of which derivatives by differences leave 1e-5
 
 
-@dataclass
 class WindowsOfAttitudes:
     """Windows of rows of attitudes alone, with the rates that lead through them.
 
     Attributes:
-        rows: (windows, parts + 1), the rows of each. rate: of the motion, rad/s.
+        rows: (windows, parts + 1), the rows of each. length: of a window, s (median).
         rates: (windows, 3), rad/s, at the first row.
         defects: (windows, numbers), rad: what the equations miss, apart from what other rates make.
+        size: of these, rms, rad.
         unexplained: rms of defects with the added acceleration, for each free number; nan before ``explain``.
         acceleration: added, rms over the windows' first rows, rad/s^2.
     """
 
-    states: RowStates
-    times: np.ndarray
-    rows: np.ndarray
-    rate: float
-    rates: np.ndarray = field(init=False)
-    defects: np.ndarray = field(init=False)
-    unexplained: float = field(init=False, default=float("nan"))
-    acceleration: float = field(init=False, default=float("nan"))
-
-    def __post_init__(self) -> None:
-        self._at = self.times[self.rows]
-        self._seen = self.states.quaternions[self.rows]
-        self._own = self.states[self.rows[:, 0]]
-        first = vector_of(multiplied(conjugated(self._seen[:, 0]), self._seen[:, 1]))
-        self.rates = first / (self._at[:, 1] - self._at[:, 0])[:, None]
+    def __init__(self, states: RowStates, times: np.ndarray, rows: np.ndarray, rate: float) -> None:
+        """Find the rates; ``rate``: of the motion, rad/s."""
+        self.rows, self.rate, self.equations = rows, rate, states.equations
+        self.unexplained = self.acceleration = float("nan")
+        self._at, self._seen, self._own = times[rows], states.quaternions[rows], states[rows[:, 0]]
+        self.length = float(np.median(self._at[:, -1] - self._at[:, 0]))
+        step = (self._at[:, 1] - self._at[:, 0])[:, None]
+        self.rates = vector_of(multiplied(conjugated(self._seen[:, 0]), self._seen[:, 1])) / step
         nothing = np.zeros(0)
         for _ in range(_ITERATIONS):  # to the second row alone, so that the rest is near
             reached = self._paths(self.rates[None], nothing[None], parts=2)[0][:, 0]
-            missed = vector_of(multiplied(conjugated(reached), self._seen[:, 1]))
-            self.rates = self.rates + missed / (self._at[:, 1] - self._at[:, 0])[:, None]
+            self.rates = self.rates + vector_of(multiplied(conjugated(reached), self._seen[:, 1])) / step
         for _ in range(_ITERATIONS - 1):
             by_rates, _ = self._derivatives(nothing)
             self.rates = self.rates + _solved(by_rates, self._missed(nothing))
-        self._by_rates, _ = self._derivatives(nothing)
-        self.defects = _apart_from(self._by_rates, self._missed(nothing)[..., None])[..., 0]
-
-    @property
-    def size(self) -> float:
-        """Defects, rms, rad."""
-        return float(np.sqrt(np.mean(self.defects**2)))
-
-    @property
-    def length(self) -> float:
-        """Of a window, s (median)."""
-        return float(np.median(self._at[:, -1] - self._at[:, 0]))
+        by_rates, _ = self._derivatives(nothing)
+        self.defects = _apart_from(by_rates, self._missed(nothing)[..., None])[..., 0]
+        self.size = float(np.sqrt(np.mean(self.defects**2)))
 
     def explain(self, noise: float, forms: int) -> None:
         """Find the change of the equations that explains the defects best, if the rows suffice for it.
@@ -124,16 +105,16 @@ class WindowsOfAttitudes:
                 break
         free = left.size * max(1 - rank / available, 1 / available)
         self.unexplained = float(np.sqrt(np.sum(left**2) / free))
-        states = self.states.equations.states(self._own, self._seen[:, 0], self.rates)
+        states = self.equations.states(self._own, self._seen[:, 0], self.rates)
         more = self._added(states, self._at[:, 0], change[None])
         self.acceleration = float(np.sqrt(np.mean(np.sum(more**2, axis=1))))
         self.rates = start
 
     def _added(self, states: np.ndarray, times: np.ndarray, changes: np.ndarray) -> np.ndarray:
         """Accelerations (rows, 3), rad/s^2, body axes, that changes (lanes, numbers) of the equations add."""
-        lanes, inertia = len(changes), self.states.equations.inertia
-        quaternions, rates = self.states.equations.attitude(states)
-        own = self.states.equations.accelerations(states, times).reshape(lanes, -1, 3)
+        lanes, inertia = len(changes), self.equations.inertia
+        quaternions, rates = self.equations.attitude(states)
+        own = self.equations.accelerations(states, times).reshape(lanes, -1, 3)
         w = rates.reshape(lanes, -1, 3)
         torque = own @ inertia + np.cross(w, w @ inertia)
         other = inertia + np.einsum("lk,kij->lij", changes[:, :6], _SYMMETRIC) * np.trace(inertia) / 3
@@ -156,11 +137,11 @@ class WindowsOfAttitudes:
         (lanes, numbers), by steps.
         """
         lanes, count = rates.shape[:2]
-        states = np.concatenate([self.states.equations.states(self._own, self._seen[:, 0], w) for w in rates])
+        states = np.concatenate([self.equations.states(self._own, self._seen[:, 0], w) for w in rates])
 
         def slopes(at: np.ndarray, now: np.ndarray) -> np.ndarray:
             more = self._added(now, at, changes) if changes.any() else None
-            return self.states.equations.slopes(now, at, more)
+            return self.equations.slopes(now, at, more)
 
         found = []
         for part in range(1, parts or self._at.shape[1]):
@@ -174,14 +155,14 @@ class WindowsOfAttitudes:
                 c = slopes(t + h / 2, states + half * b)
                 d = slopes(t + h, states + h[:, None] * c)
                 states = states + h[:, None] / 6 * (a + 2 * b + 2 * c + d)
-            found.append(normalised(self.states.equations.attitude(states)[0]).reshape(lanes, count, 4))
+            found.append(normalised(self.equations.attitude(states)[0]).reshape(lanes, count, 4))
         return np.stack(found, axis=2)
 
     def _missed(self, change: np.ndarray) -> np.ndarray:
         """What is missed (windows, numbers), rad, with a change (numbers,) of the equations."""
-        begun = self.states.equations.states(self._own, self._seen[:, 0], self.rates)
+        begun = self.equations.states(self._own, self._seen[:, 0], self.rates)
         reached = np.stack([
-            normalised(self.states.equations.attitude(self.states.equations.after(state, at[0], at[1:]))[0])
+            normalised(self.equations.attitude(self.equations.after(state, at[0], at[1:]))[0])
             for state, at in zip(begun, self._at, strict=True)
         ])  # fmt: skip
         if change.any():

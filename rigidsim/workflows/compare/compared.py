@@ -170,9 +170,7 @@ def _own_motion(experiment: Experiment, times: np.ndarray, told: list[str]) -> t
         raise RigidsimError(f"the experiment's motion {message}, before the trajectory begins")
     if found.sizes["time"] < len(times):
         told.append(f"the experiment's motion {message}; later rows aren't compared")
-    accuracy = getattr(made.outcome, "accuracy", None)
-    announced = getattr(accuracy, "certified", None) or getattr(accuracy, "estimated_attitude_error", None)
-    return found, float(announced or 0.0)
+    return found, made.attitude_error or 0.0
 
 
 # --- the result ---------------------------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -28,6 +27,7 @@ _SLOWEST = 1e-12  # rad over the whole file: a motion that is none
 _LONG = 12.0  # rad of the motion: in shorter files, errors of equal steps look like steady accelerations
 _LONGER = 4.0  # times, by which windows grow until their defects exceed the digits
 _RANDOM = 0.5  # correlation of neighbours, up to which errors are those of rounding
+_CLOSE = 0.2  # of the last digit of times, to which the rounding of evenly spaced ones is known
 _EXACT = 1e-13  # relative, of times in double precision
 _LEAST_ROWS = 20
 _UNEQUAL, _MUCH = 1.3, 3.0
@@ -38,120 +38,71 @@ _SIMILAR = 300.0  # ratio of large defects to small ones, up to which they are h
 _NORM = "quaternion_norm"
 
 
-@dataclass
 class Evidence:
-    """A trajectory in a convention beside the experiment's motion; all else is worked out when needed.
+    """A trajectory in a convention beside the experiment's motion; what costs time is worked out when needed.
 
     Attributes:
-        own: the experiment at the trajectory's times. uncertainty: announced error of its attitude, rad.
-        within: rad, what attitudes may differ by and agree. told: gets what a user should know.
+        times: (rows,), s; over the ``span``, s. quaternions: (rows, 4), w x y z, body to space axes.
+        rates, own_rates: of the file and of the experiment, (rows, 3), rad/s, body axes; None if unknown.
+        errors: angles (rows,), rad, between the attitudes. rate_errors, position_errors: (rows,), SI; None
+            where one of both has none.
+        rate: of the motion, rad/s: the experiment's, or that at which the file's attitudes turn, if larger.
+        turn: from row to row, rad (median), by the faster of both motions.
+        resolution, rate_noise: of attitudes (rad) and rates (rad/s) by the digits that they are written in.
+        attitude_noise: the same of attitudes, with the rounding of times.
         states: the rows as states of the experiment's equations; None where these can't begin from attitude
             and rates, for the reason ``why_not``.
         explained: windows of attitudes alone, once it was tried what explains their defects.
     """
 
-    given: Attitudes
-    convention: Convention
-    own: xarray.Dataset
-    uncertainty: float
-    within: float
-    told: list[str]
-    states: RowStates | None = None
-    why_not: str = ""
-    explained: WindowsOfAttitudes | None = None
+    def __init__(
+        self, given: Attitudes, convention: Convention, own: xarray.Dataset, uncertainty: float,
+        within: float, told: list[str],
+    ) -> None:  # fmt: skip
+        """Read the rows.
 
-    # --- beside the experiment ------------------------------------------------------------------------------
-
-    @property
-    def times(self) -> np.ndarray:
-        """(rows,), s."""
-        return self.given.times
-
-    @property
-    def span(self) -> float:
-        """From the first row to the last, s."""
-        return float(self.times[-1] - self.times[0])
-
-    @cached_property
-    def quaternions(self) -> np.ndarray:
-        """(rows, 4), w x y z, body to space axes."""
-        return self.convention.quaternions(self.given)
-
-    @cached_property
-    def rates(self) -> np.ndarray | None:
-        """(rows, 3), rad/s, body axes."""
-        given = self.given.rates
-        return None if given is None else self.convention.rates(given, self.quaternions)
-
-    @cached_property
-    def _vectors(self) -> np.ndarray:
-        first, *more = parts_of(self.own, "quaternion", np.arange(len(self.times)))
-        return rotation_vectors([normalised(first), *more], [self.quaternions])
-
-    @property
-    def own_rates(self) -> np.ndarray:
-        """Of the experiment, (rows, 3), rad/s, body axes."""
-        return np.asarray(self.own["angular_velocity"].values)
-
-    @cached_property
-    def errors(self) -> np.ndarray:
-        """Angles (rows,), rad, between the attitudes."""
-        return np.asarray(np.linalg.norm(self._vectors, axis=1))
-
-    @cached_property
-    def rate_errors(self) -> np.ndarray | None:
-        """(rows,), rad/s."""
-        return None if self.rates is None else np.asarray(np.linalg.norm(self.rates - self.own_rates, axis=1))
-
-    @cached_property
-    def position_errors(self) -> np.ndarray | None:
-        """(rows,), m."""
-        theirs = self.given.positions
-        if theirs is None or "position" not in self.own:
-            return None
-        return np.asarray(np.linalg.norm(theirs - self.own["position"].values, axis=1))
-
-    @cached_property
-    def rate(self) -> float:
-        """Of the motion, rad/s: the experiment's, or that at which the file's attitudes turn, if larger."""
+        Args:
+            own: the experiment at the trajectory's times. uncertainty: announced error of its attitude, rad.
+            within: rad, what attitudes may differ by and agree. told: gets what a user should know.
+        """
+        self.given, self.convention, self.told = given, convention, told
+        self._uncertainty, self._within = uncertainty, within
+        self.states: RowStates | None = None
+        self.why_not = ""
+        self.explained: WindowsOfAttitudes | None = None
+        self.times, self.quaternions = given.times, convention.quaternions(given)
+        self.span = float(self.times[-1] - self.times[0])
+        self.own_rates = own["angular_velocity"].values
+        self.rates = None if given.rates is None else convention.rates(given.rates, self.quaternions)
+        first, *more = parts_of(own, "quaternion", np.arange(len(self.times)))
+        self._vectors = rotation_vectors([normalised(first), *more], [self.quaternions])
+        self.errors = np.linalg.norm(self._vectors, axis=1)
+        self.rate_errors = None if self.rates is None else np.linalg.norm(self.rates - self.own_rates, axis=1)
+        theirs, known = given.positions, "position" in own
+        self.position_errors = (
+            np.linalg.norm(theirs - own["position"].values, axis=1) if known and theirs is not None else None
+        )
         steps = np.diff(self.times)
         turns = angles_between(self.quaternions[:-1], self.quaternions[1:])
         seen = float(np.sqrt(np.sum(turns**2 / steps) / self.span))
-        return max(defects.motion_rate(self.times, self.own_rates), seen, _SLOWEST / self.span)
-
-    @cached_property
-    def turn(self) -> float:
-        """From row to row, rad (median), by the faster of both motions."""
+        self.rate = max(defects.motion_rate(self.times, self.own_rates), seen, _SLOWEST / self.span)
         both = [self.own_rates] if self.rates is None else [self.own_rates, self.rates]
         fastest = np.max([np.linalg.norm(x, axis=1) for x in both], axis=0)
-        return float(np.median(fastest[:-1] * np.diff(self.times)))
+        self.turn = float(np.median(fastest[:-1] * steps))
 
-    # --- digits ---------------------------------------------------------------------------------------------
-
-    @property
-    def resolution(self) -> float:
-        """Of the attitudes by the digits that they are written in, rad."""
-        unit = self.convention.unit
-        return self.given.resolution[0] * (size_of(unit, "rad") if unit else 2.0)
-
-    @property
-    def rate_noise(self) -> float:
-        """The same of rates, rad/s."""
-        unit = self.convention.rate_unit
-        return self.given.resolution[1] * size_of(unit, "rad/s") if unit else 0.0
-
-    @cached_property
-    def attitude_noise(self) -> float:
-        """Of the attitudes, rad, with the rounding of times that would be even but for their digits."""
-        most, even = self.given.resolution[2], np.linspace(self.times[0], self.times[-1], len(self.times))
-        apart = float(np.abs(self.times - even).max())
-        rounded = _EXACT * abs(float(self.times[-1])) < apart <= 2 * most
-        return self.resolution + (self.rate * most / np.sqrt(3) if rounded else 0.0)
+        unit, turning = convention.unit, convention.rate_unit
+        self.resolution = given.resolution[0] * (size_of(unit, "rad") if unit else 2.0)
+        self.rate_noise = given.resolution[1] * size_of(turning, "rad/s") if turning else 0.0
+        self._even = even = np.linspace(self.times[0], self.times[-1], len(self.times))
+        exact, apart = _EXACT * abs(float(self.times[-1])), float(np.abs(self.times - even).max())
+        self._exact, most = apart <= exact, given.resolution[2]
+        rounded = not self._exact and apart <= 2 * most  # times that would be even but for their digits
+        self.attitude_noise = self.resolution + (self.rate * most / np.sqrt(3) if rounded else 0.0)
 
     @cached_property
     def floor(self) -> tuple[float, str]:
         """What attitudes may differ by and agree, rad, and why."""
-        floor = max(self.within, 4 * self.resolution, 3 * self.uncertainty)
+        floor = max(self._within, 4 * self.resolution, 3 * self._uncertainty)
         if self.errors.max() > floor and (rounded := self._rounded_times(floor)) is not None:
             why = (
                 f"the attitude error comes from its times, which are rounded ({self.given.resolution[2]:.2g}"
@@ -163,20 +114,26 @@ class Evidence:
         """Largest angle (rad) by which rounded times explain the error everywhere; None where they don't.
 
         Attitudes at a time that is off by d are turned by the rate times d. Rounded times are off by half
-        their last digit at most, by another amount in each row. Even times show no rounding.
+        their last digit at most: by what evenly spaced ones show, or by another amount in each row. Even
+        times show no rounding.
         """
         most, rates = self.given.resolution[2], self.own_rates
-        even = np.linspace(self.times[0], self.times[-1], len(self.times))
         size = np.maximum(np.linalg.norm(rates, axis=1), 1e-150)
         shifts = np.sum(self._vectors * rates, axis=1) / size**2
         rest = np.linalg.norm(self._vectors - rates * shifts[:, None], axis=1)
         bent = floor + size**2 * most**2  # which the change of the rate leaves
-        exact = (np.abs(self.times - even) <= _EXACT * abs(float(self.times[-1]))).all()
-        if exact or (rest > bent).any() or (np.abs(shifts) > 1.1 * most + floor / size).any():
+        if self._exact or (rest > bent).any() or (np.abs(shifts) > 1.1 * most + floor / size).any():
             return None
-        around = shifts - shifts.mean()
+        around, known, even = (
+            shifts - shifts.mean(),
+            shifts + self.times - self._even,
+            self._even - self._even[0],
+        )
         alike, spread = float(np.sum(around[1:] * around[:-1])), float(np.sum(around**2))
-        return None if spread == 0 or alike > _RANDOM * spread else float(1.1 * most * size.max() + floor)
+        line = np.polyval(np.polyfit(even, known, 1), even)  # which rounded ends of even times leave
+        by_digits = (np.abs(known - line) < _CLOSE * most + floor / size).all()
+        random = spread > 0 and alike <= _RANDOM * spread
+        return float(1.1 * most * size.max() + floor) if random or by_digits else None
 
     # --- by the experiment's equations ----------------------------------------------------------------------
 
