@@ -56,7 +56,7 @@ class Kinematics:
     )
     seen_so_far: list[list[Symbolic]] = field(default_factory=list, init=False, repr=False, compare=False)
     """Results of ``seen``; some may be there several times."""
-    made: dict[Any, list[Symbolic]] = field(default_factory=dict, init=False, repr=False, compare=False)
+    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
     """Long vectors that several expressions share, by what they are."""
 
     @cached_property
@@ -194,6 +194,10 @@ class Kinematics:
         first += sum(place.parameters(orbit) for orbit, place in self.tables.items())
         start, context = scene.start, scene.context
         return KernelStates(scene.ephemeris, sights, self.scaling, start, context, self.number, first)
+
+    def guess(self) -> Any:
+        """Of a state of numbers, a number that stands for a formula (see ``probing``); None for others."""
+        return None
 
     @property
     def piecewise(self) -> bool:

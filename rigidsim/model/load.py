@@ -160,30 +160,10 @@ class Load(SceneLoad):
         """Accelerations that the body causes on point masses, as ``PointMassStates.react`` takes them."""
         return []
 
-    # --- axes and planes that it leaves alone ---------------------------------------------------------------
+    # --- axes that it knows ---------------------------------------------------------------------------------
 
     def keeps_axial(self, m: Kinematics, axis: Vector) -> bool | None:
         """Whether it has no torque about an axis of symmetry (mpf, body axes); None: its vectors show it."""
-        return None
-
-    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
-        """Whether its torque stays along a principal axis about which alone the body turns (unit, mpf),
-        ``axis`` in body and ``normal`` in space axes.
-        """
-        return False
-
-    def turns_about(self, m: Kinematics, axis: Vector) -> bool:
-        """Whether it may have a torque about a unit axis in space (mpf); its potential decides first."""
-        return True
-
-    def spared_axis(self, scene: Scene) -> Vector | None:
-        """A unit axis in space (mpf) about which it has no torque; None without one."""
-        return None
-
-    def symmetry_line(self) -> tuple[Vector, Vector] | None:
-        """Point (mpf, m) and unit vector, space axes, of a line about which its force and torque leave the
-        whole angular momentum; None without one.
-        """
         return None
 
     def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
@@ -191,6 +171,11 @@ class Load(SceneLoad):
         -a . R^T f; None for any other.
         """
         return None
+
+    def direction(self, scene: Scene) -> Vector | None:
+        """Direction in space of its uniform field, or of its source at rest, by which axes are named."""
+        found = self.linear_potential(scene) or self.fixed_source(scene)
+        return None if found is None else found[1]
 
     # --- what it does to the body ---------------------------------------------------------------------------
 

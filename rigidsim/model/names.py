@@ -55,8 +55,13 @@ def written(m: Kinematics, expressions: Iterable[Expression], *, clocked: bool =
     ``clocked``.
     """
     context = m.scene.context
-    named = ((x, _state_names(m, names_used(x), clocked=clocked)) for x in expressions)
-    return [to_heyoka(x, names, m.number, context, m.sides) for x, names in named]
+    found = []
+    for x in expressions:
+        names = names_used(x)
+        guess = m.guess() if names else None
+        known = {} if guess is not None else _state_names(m, names, clocked=clocked)
+        found.append(guess if guess is not None else to_heyoka(x, known, m.number, context, m.sides))
+    return found
 
 
 def above_zero(m: Kinematics, expression: Expression) -> Symbolic:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import heyoka as hy
@@ -28,7 +27,7 @@ from rigidsim.model.observables.observable import (
 )
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene import attitude
-from rigidsim.scene.arithmetic import Vector, apply, norm
+from rigidsim.scene.arithmetic import apply, norm
 
 
 def _total_momentum_along(m: Mechanics) -> list[Symbolic]:
@@ -36,8 +35,8 @@ def _total_momentum_along(m: Mechanics) -> list[Symbolic]:
     return [hy.sum([m.number(n) * x for n, x in pairs if n != 0])]
 
 
-def _along(axis: Callable[[Mechanics], Vector | None]) -> Callable[[Mechanics], list[Symbolic]]:
-    return lambda m: [fixed_axes.along(m, m.carried(axis(m)))]
+def _along(name: str) -> Callable[[Mechanics], list[Symbolic]]:
+    return lambda m: [fixed_axes.along(m, fixed_axes.kept_axes(m)[name])]
 
 
 def _across_its_beginning(m: Mechanics) -> list[Symbolic]:
@@ -70,20 +69,20 @@ def _bogoyavlensky_scale(m: Mechanics) -> tuple[Any, str]:
 BUILT_IN: tuple[Observable, ...] = (
     Observable(
         "angular_momentum_source", (), "kg m2 s-1", "angular momentum along the axis of the fixed sources",
-        _along(fixed_axes.kept_source_axis), same_unit(MOMENTUM, 1), "space axes", ("source_axis",),
+        _along("source"), same_unit(MOMENTUM, 1), "space axes", ("source_axis",),
         lambda m: "no load has a torque about the direction of a fixed source", momentum_scale,
     ),
     Observable(
         "angular_momentum_field", (), "kg m2 s-1", "angular momentum along the uniform field",
-        _along(fixed_axes.kept_field_axis), same_unit(MOMENTUM, 1), "space axes", ("field_axis",),
+        _along("field"), same_unit(MOMENTUM, 1), "space axes", ("field_axis",),
         lambda m: "no load has a torque about the direction of the field", momentum_scale,
     ),
     *(
         Observable(
             f"angular_momentum_{'xyz'[i]}", (), "kg m2 s-1",
             f"angular momentum along the space axis {'XYZ'[i]}",
-            _along(partial(fixed_axes.free_axis, which=i)), same_unit(MOMENTUM, 1), "space axes",
-            (f"free_axis_{'xyz'[i]}",), lambda m: "no load has a torque about this axis", momentum_scale,
+            _along("xyz"[i]), same_unit(MOMENTUM, 1), "space axes",
+            (f"{'xyz'[i]}_axis",), lambda m: "no load has a torque about this axis", momentum_scale,
         )
         for i in range(3)
     ),

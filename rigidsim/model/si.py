@@ -44,7 +44,7 @@ _VALUES: dict[str, Callable[[Scaling], int]] = {
     "motion": lambda units: units.speed,
     **dict.fromkeys(
         ("narrow", "roots", "endings", "range_ends", "source_direction", "flux_density", "keeps_axial",
-         "turns_about", "lends"),
+         "lends"),
         lambda _: 0,
     ),
 }  # fmt: skip

@@ -22,6 +22,7 @@ from rigidsim.model.carriers import carried_beside
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Unsuited, formulates
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.probing import turned_out
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import AttitudeStates, StateBlock
@@ -127,9 +128,8 @@ def _plane_of(scene: Scene, loads: Sequence[Load]) -> tuple[Vector, Vector, Any]
     context = scene.context
     axis = _spin_axis(scene, loads)
     normal = apply(attitude.rotation_matrix(scene.quaternion), axis)
-    for load in loads:
-        if not load.keeps_plane(scene, axis, normal):
-            raise Unsuited(f"the torque of {load.title} may turn the body out of its plane")
+    if (load := turned_out(scene, loads, axis)) is not None:
+        raise Unsuited(f"the torque of {load.title} may turn the body out of its plane")
     turned = _least_turn(context, axis, normal)
     # the remaining rotation is about the axis, and the scalar product gives its half angle
     w, *v = attitude.product([turned[0], *(-x for x in turned[1:])], list(scene.quaternion))
@@ -153,9 +153,8 @@ def _spin_axis(scene: Scene, loads: Sequence[Load]) -> Vector:
         if norm(context, cross(axis, momentum)) > tiny * max(scene.body.principal_moments):
             raise Unsuited("the body doesn't turn about a principal axis")
         return axis
-    matrix = attitude.rotation_matrix(scene.quaternion)
     for axis in scene.body.principal_axes[::-1]:
-        if all(load.keeps_plane(scene, axis, apply(matrix, axis)) for load in loads):
+        if turned_out(scene, loads, axis) is None:
             return list(axis)
     raise Unsuited("the body is at rest, and none of its principal axes is one that every torque is along")
 

@@ -11,7 +11,7 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.names import written
 from rigidsim.model.rotations import Symbolic, apply, transpose
-from rigidsim.scene.arithmetic import Vector, cross, diagonal, parallel
+from rigidsim.scene.arithmetic import Vector, cross, diagonal
 from rigidsim.scene.expressions.tree import (
     Constant,
     Expression,
@@ -104,16 +104,6 @@ class Applied(Load):
             return None
         return self.arm, [value.at(scene.context) for value in found]
 
-    def turns_about(self, m: Kinematics, axis: Vector) -> bool:
-        """As far as components in space axes tell: a torque has none about the axis without a component along
-        it, a force without any other.
-        """
-        if self.frame != "space":
-            return True
-        acting = [not _vanishes(component) for component in self.components]
-        turns = (lambda n: n != 0) if self.title == "torque" else (lambda n: abs(n) != 1)
-        return any(a and turns(n) for a, n in zip(acting, axis, strict=True))
-
 
 def _vanishes(component: Expression) -> bool:
     return isinstance(component, Constant) and component.value.sign == 0
@@ -126,14 +116,6 @@ class Torque(Applied):
     Fields = TorqueFields
     title = "torque"
     unit = "N m"
-
-    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
-        """Whether only the component along the axis is nonzero."""
-        along = axis if self.frame == "body" else normal
-        return all(
-            _vanishes(component) or parallel(scene.context, unit, along)
-            for component, unit in zip(self.components, diagonal([scene.context.one] * 3), strict=True)
-        )
 
     def torque(self, m: Kinematics) -> list[Term]:
         size = m.scene.context.ldexp(m.scene.context.one, -m.scaling.energy)

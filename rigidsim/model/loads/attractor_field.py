@@ -26,7 +26,7 @@ from rigidsim.model.loads.central_gravity import (
 from rigidsim.model.loads.figure_in_flight import refuse_inside
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.turning_harmonics import Outward, TurningHarmonics, frame_of
-from rigidsim.scene.arithmetic import Vector, unit_vectors
+from rigidsim.scene.arithmetic import unit_vectors
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
@@ -92,9 +92,6 @@ class AttractorField(Load):
     @property
     def conservative(self) -> bool:  # type: ignore[override]
         return self.field.rests
-
-    def symmetry_line(self) -> tuple[Vector, Vector] | None:
-        return (self.beside.position, self.field.frame[2]) if self.field.zonal else None
 
     # --- what it does ---------------------------------------------------------------------------------------
 

@@ -12,13 +12,7 @@ from rigidsim.model.load import Term
 from rigidsim.model.loads.magnetic_field import InMagneticField, MagneticFieldFields, numbers
 from rigidsim.scene.arithmetic import (
     Vector,
-    across,
-    apply,
     cross,
-    diagonal,
-    negligible,
-    norm,
-    parallel,
     unit_vectors,
 )
 from rigidsim.scene.exact import ExactNumber
@@ -99,31 +93,12 @@ class EddyCurrents(InMagneticField):
                     terms.append((vector, induced[k] * b[n]))
         return terms
 
-    def turns_about(self, m: Kinematics, axis: Vector) -> bool:
-        """Whether the axis isn't along a uniform field."""
-        return not (self.uniform and parallel(m.scene.context, self.source, axis))
-
-    def spared_axis(self, scene: Scene) -> Vector | None:
-        if not self.uniform or not self.acts():
-            return None
-        return [x / norm(scene.context, self.source) for x in self.source]
+    def direction(self, scene: Scene) -> Vector | None:
+        return self.source if self.uniform else None
 
     def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
         """False: it damps any spin across the field."""
         return False
-
-    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
-        """Whether a uniform field is along the axis of spin, where no torque is, or across it with a tensor
-        that keeps the axis.
-        """
-        context = scene.context
-        if not self.uniform:
-            return False
-        if parallel(context, self.source, normal):
-            return True
-        turned = apply(diagonal(self.moments), axis)
-        kept = norm(context, cross(turned, axis)) <= negligible(context) * max(self.moments)
-        return bool(kept) and across(context, self.source, normal)
 
     def amplitude(self, scene: Scene) -> Any:
         return scene.context.zero  # it only removes energy

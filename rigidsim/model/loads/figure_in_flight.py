@@ -35,9 +35,6 @@ class FigureInFlight(FigureAttraction):
 
     wide = True
 
-    def symmetry_line(self) -> tuple[Vector, Vector] | None:
-        return None if self.pole is None else (self.beside.position, self.pole)
-
     def _flown(self, m: Kinematics) -> tuple[Any, Any]:
         """K m over the unit of distance to the power of 3, energy; K over its power of 5, internal (mpf)."""
         context, unit = m.scene.context, self.beside.source_place(m).unit

@@ -27,7 +27,7 @@ from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import length_text
 from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.model.turning_harmonics import by_powers
-from rigidsim.scene.arithmetic import Vector, across, cross, negligible, norm, parallel, unit_vectors
+from rigidsim.scene.arithmetic import Vector, across, cross, unit_vectors
 from rigidsim.scene.bodies.gravity_field import LEAST, MOST, GravityField, Harmonic
 from rigidsim.scene.effect_parts import EffectPart, degree_parts
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
@@ -191,42 +191,6 @@ class FieldAttraction(Load):
         context = m.scene.context
         found = self._vectors(context).values()
         return all(across(context, vector, axis) for vectors in found for vector in vectors.values())
-
-    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
-        """Whether the source stays in the plane, or along its normal, and the torque there is along the axis:
-        for a field that is symmetric to the plane.
-        """
-        context, towards = scene.context, self.beside.source_at_start(scene)
-        if not self.beside.keeps_plane(scene, axis, normal):
-            return False
-        if parallel(context, towards, normal):
-            return all(self._keeps(context, axis, u) for u in (axis, [-x for x in axis]))
-        least = min(range(3), key=lambda i: abs(plain(axis[i])))
-        first = cross(axis, unit_vectors(context)[least])
-        first = [x / norm(context, first) for x in first]
-        second, count = cross(axis, first), 2 * self.degree + 1  # which tell a sum of such harmonics
-        for k in range(count):
-            c, s = context.cos(2 * context.pi * k / count), context.sin(2 * context.pi * k / count)
-            if not self._keeps(context, axis, [c * a + s * b for a, b in zip(first, second, strict=True)]):
-                return False
-        return True
-
-    def _keeps(self, context: Any, axis: Vector, direction: Vector) -> bool:
-        """Whether the torque towards a source in a direction (mpf) is along the axis, or zero, degree by
-        degree.
-        """
-        tiny, values = negligible(context), Harmonics(direction, lambda x: x, context)
-        for vectors in self._vectors(context).values():
-            torque = [sum((x[i] * values[key] for key, x in vectors.items()), context.zero) for i in range(3)]
-            size = sum((norm(context, x) for x in vectors.values()), context.zero)
-            if norm(context, cross(axis, torque)) > tiny * size:
-                return False
-        return True
-
-    def turns_about(self, m: Kinematics, axis: Vector) -> bool:
-        """Whether the axis isn't the line to a source at rest."""
-        fixed = self.beside.fixed_source(m.scene)
-        return fixed is None or not parallel(m.scene.context, fixed[1], axis)
 
     # --- sizes, and what readers are told -------------------------------------------------------------------
 

@@ -190,10 +190,6 @@ class GravityGradient(GradientSource, Load):  # type: ignore[override]
         """True: c x (I c) has no component along an axis of symmetry."""
         return True
 
-    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
-        """Whether c stays perpendicular to or along the axis: c x (I c) is then along the axis or zero."""
-        return self.placement.keeps_plane(scene.context, normal)
-
     def fixed_source(self, scene: Scene) -> tuple[Any, Vector] | None:
         """See ``Load``: the source, if it is at rest."""
         position = self.placement.rests()

@@ -14,7 +14,7 @@ from rigidsim.model.load import Term
 from rigidsim.model.loads.magnetic_field import InMagneticField, MagneticFieldFields, numbers
 from rigidsim.model.names import written
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.arithmetic import Vector, across, cross, diagonal, norm, unit_vectors
+from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm, unit_vectors
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import Constant, Expression, states_read
 from rigidsim.scene.fields import NumberOrFormula, Triple
@@ -72,11 +72,6 @@ class MagneticDipole(InMagneticField):
         moment, axes = self._moment(m), unit_vectors(m.scene.context)
         return [(cross(moment, axis), b) for axis, b in zip(axes, self._field(m), strict=True)]
 
-    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
-        """Whether moment and field are both perpendicular to the axis, in a uniform field."""
-        context = scene.context
-        return self.uniform and across(context, self.moment, axis) and across(context, self.source, normal)
-
     def potential(self, m: Kinematics) -> Symbolic | None:
         if not self.acts():
             return None
@@ -117,9 +112,6 @@ class SteeredDipole(MagneticDipole):
 
     def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
         return None
-
-    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
-        return False
 
     def amplitude(self, scene: Scene) -> Any | None:
         return None

@@ -25,7 +25,7 @@ from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import length_text
 from rigidsim.model.loads.gravity_field import AttractingFields, least_distance
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.arithmetic import Vector, across, cross, norm, parallel, unit_vectors
+from rigidsim.scene.arithmetic import Vector, cross, norm, parallel, unit_vectors
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.fields import (
@@ -197,20 +197,6 @@ class FigureAttraction(Load):
     def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
         """True: the tensor of a symmetric body has no torque about its axis."""
         return True
-
-    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
-        """Whether the source stays in the plane or on its normal, and the pole, too."""
-        if self.pole is None:
-            return False
-        flat = across(scene.context, self.pole, normal) or parallel(scene.context, self.pole, normal)
-        return flat and self.beside.keeps_plane(scene, axis, normal)
-
-    def turns_about(self, m: Kinematics, axis: Vector) -> bool:
-        """Whether the axis isn't the line to a source at rest that is its pole as well."""
-        fixed, context = self.beside.fixed_source(m.scene), m.scene.context
-        if fixed is None or self.pole is None:
-            return True
-        return not (parallel(context, fixed[1], axis) and parallel(context, self.pole, axis))
 
     # --- sizes, and what readers are told -------------------------------------------------------------------
 

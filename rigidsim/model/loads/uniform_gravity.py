@@ -14,7 +14,7 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import potential_amplitude
-from rigidsim.scene.arithmetic import Vector, across, cross, unit_vectors
+from rigidsim.scene.arithmetic import Vector, cross, unit_vectors
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.fields import Acceleration, Triple
@@ -102,13 +102,6 @@ class UniformGravity(Load):
         weights = [context.ldexp(-mass * g, scaling.length - scaling.energy) for g in scene.gravity]
         terms = [m.number(k) * x for k, x in zip(weights, m.position, strict=True) if k]
         return hy.sum(terms) if terms else None
-
-    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
-        """Whether pull and arm are perpendicular to the axis, so that the torque points along it."""
-        arm, pull = scene.torque_arm, self.acceleration
-        if arm is None or all(x == 0 for x in arm) or all(x == 0 for x in pull):
-            return True
-        return across(scene.context, arm, axis) and across(scene.context, pull, normal)
 
     def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
         """M com (body axes) and g (space axes) about a fixed point; None in free fall."""

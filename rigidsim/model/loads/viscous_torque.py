@@ -9,7 +9,7 @@ from pydantic import Field
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.scene.arithmetic import Vector, cross, negligible, norm
+from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.fields import Damping, NotNegative, Triple
 from rigidsim.scene.registry import LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene
@@ -43,11 +43,6 @@ class ViscousTorque(Load):
 
     def damping(self) -> Vector | None:
         return self.coefficients
-
-    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
-        """Whether damping a spin about the axis gives a torque along that axis."""
-        context, damped = scene.context, [c * x for c, x in zip(self.coefficients, axis, strict=True)]
-        return bool(norm(context, cross(damped, axis)) <= negligible(context) * max(self.coefficients))
 
     def amplitude(self, scene: Scene) -> Any:
         return scene.context.zero  # it only removes energy

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import heyoka as hy
@@ -28,7 +27,7 @@ from rigidsim.model.load import loads_of
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.si import values_in_si
-from rigidsim.scene.arithmetic import Vector, negligible
+from rigidsim.scene.arithmetic import negligible
 from rigidsim.scene.choices import variables_named
 from rigidsim.scene.registry import register_observable
 from rigidsim.scene.scene import Scene
@@ -118,10 +117,6 @@ def _sourced(m: Mechanics) -> bool:
     return load is not None and (load.attracting_point is None or m.velocity is not None)
 
 
-def _with_axis(found: Callable[[Mechanics], Vector | None]) -> Need:
-    return Need(lambda m: m.attitude is not None and found(m) is not None)
-
-
 def _isotropic_damping(m: Mechanics) -> bool:
     """Whether the body turns, under dampings alone that add up to a multiple of the inertia tensor."""
     found = [load.damping() for load in m.turning]
@@ -146,11 +141,9 @@ NEEDS: dict[str, Need] = {
     "jacobi": Need(lambda m: m.attitude is not None and rotating_orbit(m) is not None),
     "kovalevskaya": Need(lambda m: kovalevskaya_top(m) is not None),
     "goryachev_chaplygin": Need(lambda m: goryachev_chaplygin_top(m) is not None),
-    "source_axis": _with_axis(fixed_axes.kept_source_axis),
-    "field_axis": _with_axis(fixed_axes.kept_field_axis),
     **{
-        f"free_axis_{name}": _with_axis(partial(fixed_axes.free_axis, which=i))
-        for i, name in enumerate("xyz")
+        f"{name}_axis": Need(lambda m, name=name: m.attitude is not None and name in fixed_axes.kept_axes(m))
+        for name in ("source", "field", *"xyz")
     },
     "isotropic_damping": Need(lambda m: m.attitude is not None and _isotropic_damping(m)),
     "plane": Need(

@@ -131,10 +131,6 @@ class Placement(ABC):
         """Its place if it never moves, m (mpf)."""
         return None
 
-    def keeps_plane(self, context: Any, normal: Vector) -> bool:
-        """Whether it stays perpendicular to a unit vector, or along it."""
-        return False
-
     def pictured(self) -> dict[str, Any]:
         """What a timeline draws it by (``rigidsim.look.record``)."""
         return {}

@@ -15,7 +15,7 @@ from rigidsim.model.orbits.kepler_motion import KeplerParts
 from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion
 from rigidsim.model.plausibility import about_distance, about_orbit, about_spin, about_strength, attracting
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.arithmetic import Vector, across, norm, parallel
+from rigidsim.scene.arithmetic import Vector, norm
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
@@ -55,10 +55,6 @@ class PlacedAtRest(Placement):
 
     def circuit(self, context: Any) -> Circuit:
         return Circuit()
-
-    def keeps_plane(self, context: Any, normal: Vector) -> bool:
-        direction = self._direction(context)
-        return across(context, direction, normal) or parallel(context, direction, normal)
 
     def pictured(self) -> dict[str, Any]:
         return {"position": [float(x) for x in self.position]}
@@ -106,9 +102,6 @@ class PlacedOnOrbit(Placement):
 
     def fastest_rate(self, context: Any) -> Any:
         return self.orbit.fastest_rate(context)
-
-    def keeps_plane(self, context: Any, normal: Vector) -> bool:
-        return self.orbit.node_rate == 0 and parallel(context, self.orbit.normal(context), normal)
 
     def pictured(self) -> dict[str, Any]:
         names = [field.name for field in dataclasses.fields(self.orbit)]
