@@ -146,19 +146,13 @@ def turned_out(scene: Scene, loads: Sequence[Load], axis: Vector) -> Load | None
     )
     probes = Probe.several(m, axis)
     for load in loads:
-        if _reads_more(load) or not type(load).__module__.startswith(
-            "rigidsim."
-        ):  # may vanish in states tried
+        if _reads_more(load) or not type(load).__module__.startswith("rigidsim."):  # may vanish when tried
             return load
         for probe in probes:
             terms = torque_terms(load, probe)
             found = probe.added(term for term in terms if not parallel(context, term[0], axis))
-            size = sum(
-                norm(context, vector) for vector, _ in terms
-            )  # of which expressions are parts of order 1
-            if found is None or norm(context, cross(found[0], axis)) > negligible(context) * (
-                size + found[1]
-            ):
+            size = sum(norm(context, vector) for vector, _ in terms)  # whose factors are of order 1
+            if found is None or norm(context, cross(found[0], axis)) > negligible(context) * size:
                 return load
     return None
 
