@@ -154,7 +154,7 @@ class _ActiveRun:
         trail = self.recorder.trail
         session.observer.phase("estimate")
         with self.interruption.dispensable():
-            found = found.estimated(trail, parts.corrected, self._wanted, self.driver.solver.errors)
+            found = found.estimated(trail, parts.corrected, self._wanted, self.parts.stepper.errors)
             found = replace(found, cheaper=cheaper_model(found, session.tuning.advice, self._wanted))
         session.phases.next("estimate")
         if not prepared.system.formulation.resolves_rotation and self.progress.status is Status.FINISHED:

@@ -5,7 +5,7 @@ import time
 from rigidsim.solve.corrected_stepper import Position, StepBoundary
 from rigidsim.solve.sampler import MEASURED, Check, Pacing, Progress, SampleBuffer, SampleReceiver
 from rigidsim.solve.sampling import SampleClock
-from rigidsim.solve.solvers.solver import Solver
+from rigidsim.solve.solvers.stepwise import StepwiseSolver
 from rigidsim.solve.status import Status
 from rigidsim.solve.turns import JoinedAngles
 
@@ -18,7 +18,7 @@ class Driver:
 
     def __init__(
         self,
-        solver: Solver,
+        solver: StepwiseSolver,
         clock: SampleClock,
         angles: JoinedAngles,
         receiver: SampleReceiver,

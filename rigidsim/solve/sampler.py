@@ -72,7 +72,7 @@ class Pacing:
     chunk_seconds: float = 0.05  # between checks of guards and Ctrl-C; well below what a user waits
     patience: float = 2.0  # seconds until samples of a slow run are handed over
     rows_at_once: int = 8192  # samples in a block that is evaluated; more are no faster, and take memory
-    rows_waiting: int = 32768  # in memory before they are evaluated; in cheap precisions those of a chunk
+    rows_waiting: int = 65536  # in memory before they are evaluated: 8 MB in double precision
     skipped_from: int = 12  # steps to a sample from which a call without dense output costs less
     margin: float = 0.97  # of the steps to a sample, if as long as those of the latest call, that are skipped
     spare: float = 4.0  # and fewer by so many, some of which are far from the mean

@@ -149,6 +149,10 @@ class Stepper:
         """State at a time within the step just taken by ``step``, shape (states,)."""
         raise NotImplementedError
 
+    def dense_rows(self, times: np.ndarray) -> np.ndarray:
+        """The same at many times (n,), (n, states)."""
+        return np.array([self.dense(time) for time in times])
+
     def skip(self, count: int) -> bool:
         """Take ``count`` steps, fewer if one ends at ``until``; False if the state is no longer finite."""
         smallest, largest = math.inf, 0.0

@@ -11,12 +11,9 @@ from rigidsim.scene.choices import METHODS, Method
 from rigidsim.scene.registry import register_class
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.closed_form import ClosedForm
-from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.effects.effect import registered_effects
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar, precision_of
-from rigidsim.solve.sampler import Pacing
-from rigidsim.solve.solvers.solver import Solver
 from rigidsim.solve.solvers.stepwise import StepwiseSolver
 from rigidsim.solve.stepper import Stepper
 
@@ -38,6 +35,7 @@ class Algorithm:
         own_errors: whether it tells its errors itself (``Stepper.errors``), or has none to tell; if not, they
             are estimated from motions that begin beside its own, in heyoka's rounding.
         form: the closed form that gives the states; None if none does.
+        solver: takes the motion along by its stepper.
     """
 
     method: ClassVar[Method]
@@ -46,6 +44,7 @@ class Algorithm:
     takes_series: ClassVar[bool] = False
     own_errors: ClassVar[bool] = True
     form: ClosedForm | None = None
+    solver: ClassVar[type[StepwiseSolver]] = StepwiseSolver
 
     @property
     def title(self) -> str:
@@ -75,14 +74,6 @@ class Algorithm:
             log: where events go.
         """
         raise NotImplementedError
-
-    def solver(self, corrected: CorrectedStepper, pacing: Pacing) -> Solver:
-        """What takes the motion along.
-
-        Args:
-            corrected: its stepper, with the effects between steps.
-        """
-        return StepwiseSolver(corrected, pacing)
 
 
 ALGORITHMS: dict[str, type[Algorithm]] = {}

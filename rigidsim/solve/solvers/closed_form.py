@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,24 +11,22 @@ from rigidsim.model.system import System
 from rigidsim.scene.choices import METHODS
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.closed_form import ClosedForm, NoClosedForm, closed_form_of
-from rigidsim.solve.corrected_stepper import CorrectedStepper, StepBoundary
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar
-from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.algorithm import Algorithm, Unsuitable, solves
-from rigidsim.solve.solvers.solver import Solver
-from rigidsim.solve.status import Status
 from rigidsim.solve.stepper import Mark, Stepper
 
-_WIDE_ROWS = 64  # at once beyond double precision, where one takes about a millisecond
+_PART = 2.0**-6  # of the motion, after which progress is noted
 
 
-class AtStart(Stepper):
-    """Stands at the start of a motion that is solved without steps."""
+class ClosedFormStepper(Stepper):
+    """Goes along a motion whose states are known at all times, by a part of it; such steps aren't counted."""
 
-    def __init__(self, system: System, precision: Precision, start: Scalar) -> None:
+    def __init__(self, form: ClosedForm, system: System, precision: Precision, start: Scalar) -> None:
         super().__init__(system, precision)
-        self._time, self._state = start, precision.array(system.initial)
+        self._form, self._start, self._time = form, start, start
+        self._state = precision.array(system.initial)
+        self.smallest = math.inf
 
     @property
     def time(self) -> Scalar:
@@ -37,34 +36,16 @@ class AtStart(Stepper):
     def state(self) -> np.ndarray:
         return self._state
 
+    def step(self) -> bool:
+        length = ((self.destination or 0.0) - float(self._start)) * _PART
+        self._time = self._time + self.precision.of_double(length or 1.0)
+        return True
+
+    def dense_rows(self, times: np.ndarray) -> np.ndarray:
+        return self._form.states(self.system, self.precision, times, self._start)
+
     def back_to(self, mark: Mark) -> None:
-        """See ``Stepper``: it never left."""
-
-
-class ClosedFormSolver(Solver):
-    """Evaluates a closed form at the samples; its only boundary is the start."""
-
-    def __init__(self, form: ClosedForm, corrected: CorrectedStepper, pacing: Pacing) -> None:
-        self._form, self._corrected, self._rows = form, corrected, pacing.rows_at_once
-        self._start = corrected.boundary()
-
-    def boundary(self) -> StepBoundary:
-        return self._start
-
-    def back_to(self, boundary: StepBoundary) -> None:
-        pass
-
-    def advance(self, boundary: StepBoundary, most: int | None) -> Status | None:
-        begin, buffer = self._corrected.stepper, self.buffer
-        narrow, last = begin.precision.narrow, self.clock.at(self.clock.count - 1)
-        times = buffer.until(last, self._rows if narrow else min(self._rows, _WIDE_ROWS))
-        states = self._form.states(begin.system, begin.precision, times, begin.time)
-        buffer.take(self._corrected.samples(buffer.count, times, states), boundary)
-        self.settle(boundary, times[-1])
-        return Status.FINISHED if buffer.complete else None
-
-    def settle(self, boundary: StepBoundary, moment: Scalar) -> None:
-        self.progress.time = float(moment) * self.clock.unit
+        self._time = mark.time[0]
 
 
 @solves(METHODS["closed_form"])
@@ -96,7 +77,4 @@ class InClosedForm(Algorithm):
     def stepper(
         self, system: System, precision: Precision, tolerance: Scalar | None, start: Scalar, log: EventLog
     ) -> Stepper:
-        return AtStart(system, precision, start)
-
-    def solver(self, corrected: CorrectedStepper, pacing: Pacing) -> Solver:
-        return ClosedFormSolver(self.form, corrected, pacing)
+        return ClosedFormStepper(self.form, system, precision, start)

@@ -1,8 +1,6 @@
 """A solver that takes natural steps and finds the samples within them: single ones, whatever takes them."""
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,25 +8,12 @@ from rigidsim.solve.corrected_stepper import CorrectedStepper, StepBoundary
 from rigidsim.solve.precision import Scalar
 from rigidsim.solve.sampler import Pacing, Progress, SampleBuffer
 from rigidsim.solve.sampling import SampleClock
-from rigidsim.solve.solvers.solver import Solver
 from rigidsim.solve.status import Status
-from rigidsim.solve.stepper import OwnErrors
 
 _CAREFUL = 2**20  # steps at once
 
-States = Callable[[np.ndarray], np.ndarray]
-"""Function from sample times (n,) to states (n, states), both in internal units."""
 
-
-@dataclass(frozen=True)
-class Reach:
-    """Steps just taken whose samples are still to be taken: one step can hold any number of them."""
-
-    boundary: StepBoundary
-    states: States
-
-
-class StepwiseSolver(Solver):
+class StepwiseSolver:
     """Takes single steps, the samples within them, and what effects do in between.
 
     Each round takes either a chunk of steps or a block of samples within the last steps, so that guards
@@ -38,7 +23,7 @@ class StepwiseSolver(Solver):
     def __init__(self, corrected: CorrectedStepper, pacing: Pacing) -> None:
         self.corrected, self.stepper = corrected, corrected.stepper
         self.pacing = pacing
-        self._reach: Reach | None = None
+        self._reached: StepBoundary | None = None  # before steps with samples left to take
         self._before: StepBoundary | None = None  # the start of the step in which the run ended
         self._careful: int | None = None  # steps at once, on the way to where the state is lost
         self._at_once = 1
@@ -46,7 +31,8 @@ class StepwiseSolver(Solver):
     def begin(
         self, clock: SampleClock, buffer: SampleBuffer, progress: Progress, start: StepBoundary | None
     ) -> None:
-        super().begin(clock, buffer, progress, start)
+        """Get ready, at a boundary or, without one, where it stands; samples go to the buffer."""
+        self.clock, self.buffer, self.progress = clock, buffer, progress
         self._last = clock.at(clock.count - 1)
         if start is not None:
             self.corrected.back_to(start)
@@ -54,20 +40,28 @@ class StepwiseSolver(Solver):
         self._account()
 
     def boundary(self) -> StepBoundary:
-        return self._before or (self._reach.boundary if self._reach else self.corrected.boundary())
+        """A boundary past which all samples are still to be found; after the last sample, one before it."""
+        return self._before or self._reached or self.corrected.boundary()
 
     def back_to(self, boundary: StepBoundary) -> None:
-        self._reach = self._before = None
+        """Return to an earlier boundary; samples found past it have been dropped."""
+        self._reached = self._before = None
         self.corrected.back_to(boundary)
         self._account()
 
     @property
     def pending(self) -> bool:
-        return self._reach is not None
+        """Whether steps have been taken whose samples aren't all found yet."""
+        return self._reached is not None
 
     def advance(self, boundary: StepBoundary, most: int | None) -> Status | None:
+        """Go on for about the time of a chunk, or until the buffer is full, by at most so many natural steps.
+
+        Returns:
+            The status if the motion ends here: FINISHED once the last sample is found.
+        """
         finite = True
-        if self._reach is not None:
+        if self._reached is not None:
             self._take_reached()
         else:
             finite = self.go_on(boundary, most)
@@ -75,7 +69,7 @@ class StepwiseSolver(Solver):
         if self.buffer.complete:
             return Status.FINISHED
         stop = self.stepper.log.stop
-        if stop is not None and self._reach is None:
+        if stop is not None and self._reached is None:
             self.settle(boundary, stop)
             return self.stepper.log.status
         if self.corrected.collapsed:
@@ -115,8 +109,8 @@ class StepwiseSolver(Solver):
             if not reached:
                 self.corrected.correct()
             else:
-                self.reached(Reach(boundary, self._dense))
-            if self._reach is not None or self.buffer.complete or self.buffer.full:
+                self.reached(boundary)
+            if self._reached is not None or self.buffer.complete or self.buffer.full:
                 break
             if self.stepper.log.stop is not None or self.corrected.collapsed:
                 break
@@ -135,34 +129,32 @@ class StepwiseSolver(Solver):
         self.progress.steps = self.stepper.steps
         self.progress.time = float(self.stepper.time) * self.clock.unit
 
-    def _dense(self, times: np.ndarray) -> np.ndarray:
-        return np.array([self.stepper.dense(t) for t in times])
-
     def take(self, times: np.ndarray, states: np.ndarray, boundary: StepBoundary) -> None:
         """Take samples that have been found past a boundary."""
         self.buffer.take(self.corrected.samples(self.buffer.count, times, states), boundary)
 
-    def reached(self, reach: Reach) -> None:
+    def reached(self, boundary: StepBoundary) -> None:
         """Take samples within steps just taken, as many as may wait; the rest is left to later rounds."""
-        self._reach = reach
+        self._reached = boundary
         self._take_reached()
 
     def _take_reached(self) -> None:
         """Take the next of the samples within steps already taken."""
-        assert self._reach is not None
+        boundary = self._reached
+        assert boundary is not None
         stop, room = self.stepper.log.stop, self.buffer.room
         limit = self.stepper.time if stop is None else min(self.stepper.time, stop)
         times = self.buffer.until(limit, room)
         if len(times):
             started = time.perf_counter()
-            self.take(times, self._reach.states(times), self._reach.boundary)
+            self.take(times, self.stepper.dense_rows(times), boundary)
             self.buffer.took("dense output", len(times), time.perf_counter() - started)
         if self.buffer.complete or self.buffer.upcoming > limit:
-            self.none_left(self._reach.boundary)
+            self.none_left(boundary)
 
     def none_left(self, boundary: StepBoundary) -> None:
         """Continue after all samples within the last steps are taken: with corrections, or with the end."""
-        self._reach = None
+        self._reached = None
         if self.buffer.complete and self.stepper.steps == boundary.mark.steps + 1:
             self._before = boundary
         elif self.buffer.complete:
@@ -171,13 +163,17 @@ class StepwiseSolver(Solver):
             self.corrected.correct()
 
     def settle(self, boundary: StepBoundary, moment: Scalar) -> None:
-        self._reach = None
+        """Go back to a boundary before a moment and on to the first at or past it, so that where a run ends
+        follows from the samples and the motion alone.
+        """
+        self._reached = None
         self._before = self.corrected.arrive(boundary, moment)
         self._account()
 
     def stop(self) -> None:
-        if self._reach is not None and not self.buffer.complete:
-            self.back_to(self._reach.boundary)
+        """Give up steps whose samples aren't all found: a run that is resumed takes them again."""
+        if self._reached is not None and not self.buffer.complete:
+            self.back_to(self._reached)
 
     def lost(self, boundary: StepBoundary, tried: int) -> bool:
         """After a failure among many steps, or steps too small to be taken at once, go back and continue with
@@ -188,7 +184,3 @@ class StepwiseSolver(Solver):
         self.progress.last_good = boundary
         self._careful = max(1, tried // 2)
         return tried > 1
-
-    def errors(self) -> OwnErrors | None:
-        """See ``Solver``: what its stepper tells."""
-        return self.stepper.errors()

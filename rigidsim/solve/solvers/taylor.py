@@ -10,29 +10,21 @@ import time
 
 from rigidsim.model.system import System
 from rigidsim.scene.choices import DEFAULT_METHOD, METHODS
-from rigidsim.solve.corrected_stepper import CorrectedStepper, StepBoundary
+from rigidsim.solve.corrected_stepper import StepBoundary
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar
-from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.algorithm import Algorithm, solves
-from rigidsim.solve.solvers.solver import Solver
-from rigidsim.solve.solvers.stepwise import Reach, StepwiseSolver
+from rigidsim.solve.solvers.stepwise import StepwiseSolver
 from rigidsim.solve.stepper import SamplesWithin
 from rigidsim.solve.switching.stepper import stepper_of
 from rigidsim.solve.taylor_stepper import TaylorStepper
-
-_MOST_SAMPLES = 65536  # in a stride that is taken in a call: 8 MB in double precision
 
 
 class TaylorSolver(StepwiseSolver):
     """Takes many steps at once; only the last ones of a run are single."""
 
     stepper: TaylorStepper
-
-    def __init__(self, corrected: CorrectedStepper, stepper: TaylorStepper, pacing: Pacing) -> None:
-        super().__init__(corrected, pacing)
-        self.stepper = stepper
-        self._length = 0.0  # of a step, as far as is known, internal units
+    _length = 0.0  # of a step, as far as is known, internal units
 
     def go_on(self, boundary: StepBoundary, most: int | None) -> bool:
         started, mark = time.perf_counter(), boundary.mark
@@ -83,8 +75,8 @@ class TaylorSolver(StepwiseSolver):
             self.note_steps()
             if len(found := samples.until(stepper.log.stop)):
                 self.take(samples.times[: len(found)], found, boundary)
-            self.reached(Reach(boundary, self._dense))
-            if self._reach is not None or stepper.log.stop is not None or self.corrected.collapsed:
+            self.reached(boundary)
+            if self._reached is not None or stepper.log.stop is not None or self.corrected.collapsed:
                 break
             if buffer.full or buffer.complete:
                 break
@@ -95,7 +87,7 @@ class TaylorSolver(StepwiseSolver):
         """The samples that may lie within so many steps: as many as may wait, or those of a stride."""
         limit, room = self._last, self.buffer.room
         if self.stepper.precision.cheap:
-            room = max(room, _MOST_SAMPLES)
+            room = max(room, self.pacing.rows_waiting)
         far = float(self.stepper.time) + 2 * count * self._length
         if far < float(self._last):
             limit = self.stepper.precision.of_double(far)
@@ -110,12 +102,9 @@ class Taylor(Algorithm):
     title = "heyoka Taylor, natural steps, dense output"
     finds_events = sets_parameters = takes_series = True
     own_errors = False
+    solver = TaylorSolver
 
     def stepper(
         self, system: System, precision: Precision, tolerance: Scalar | None, start: Scalar, log: EventLog
     ) -> TaylorStepper:
         return stepper_of(system, precision, tolerance, start, log)
-
-    def solver(self, corrected: CorrectedStepper, pacing: Pacing) -> Solver:
-        assert isinstance(corrected.stepper, TaylorStepper)
-        return TaylorSolver(corrected, corrected.stepper, pacing)
