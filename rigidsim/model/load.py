@@ -152,6 +152,10 @@ class Load(SceneLoad):
         """The same at the start (mpf, m, space axes)."""
         raise NotImplementedError
 
+    def motion_at_start(self, scene: Scene) -> Vector:
+        """Velocity of the body at the start as seen from its source (mpf, m/s, space axes), in flight."""
+        raise NotImplementedError
+
     def fixed_source(self, scene: Scene) -> tuple[Any, Vector] | None:
         """Of a source at rest in space 3 G M / R^3 (mpf, 1/s^2), and the unit vector to it in space axes."""
         return None

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import Any
 
+from rigidsim.model.load import Load
 from rigidsim.model.load_words import ASTRONOMICAL_UNIT, length_text, span_words
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, dot, hansen, norm
@@ -20,6 +21,7 @@ from rigidsim.scene.orbit_keys import PACES, Elements
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.readable import span_text
+from rigidsim.scene.registry import LoadFields
 from rigidsim.scene.scene import Scene
 
 _CUBIC_KILOMETRE = 1e9  # m^3
@@ -47,15 +49,44 @@ _SAME = 0.05  # of the miss, by which the spin and a multiple of the mean motion
 _ALIKE = 2e-3  # relative difference of a spin from the orbit's rate, as far as three digits tell
 
 
-def implied_strength(orbit: KeplerOrbit) -> float:
-    """G M of Kepler's third law for an orbit's size and mean motion, m^3/s^2."""
-    return float(orbit.mean_motion**2 * orbit.semi_major_axis**3)
+def about_load(load: Load, fields: LoadFields, where: str, scene: Scene) -> Iterator[Caution]:
+    """Values of a load's keys by which its source, or the start beside it, is implausible."""
+    given: Any = getattr(fields, "gravitational_parameter", None)
+    name, elements = getattr(fields, "source", None), getattr(fields, "elements", None)
+    placed, number = fields.placed_by(free_flight=scene.free_flight), getattr(load, "number", None)
+    yield from load.cautions(fields, where, scene)
+    yield from _about_radius(fields, where)
+    if load.reacts and number is not None:  # one of the point masses
+        given, at = scene.config.bodies[number].gravitational_parameter, f"[[bodies]] number {number + 1}"
+    else:
+        at = where
+    if load.orbit is not None and elements is not None:
+        yield from _about_orbit(elements, load.orbit, given, where, scene)
+        if load.gradient_source is not None:
+            yield from _about_spin(elements, load.orbit, given, where, scene)
+    elif placed is not None and (name is not None or given is not None) and not load.of_time:
+        place = load.source_at_start(scene)
+        distance = float(norm(scene.context, place))
+        if name is not None:
+            yield from about_named_strength(given, name, where)
+            body = _named(name)
+        else:
+            yield from _about_strength(given, distance, at)
+            body = _meant_body(given) or (_in_kilometres(float(given), distance) if given.assumed else None)
+        if load.gradient_source is not None and getattr(fields, "position", None) is not None:
+            yield from _about_distance(body, distance, fields.position, f"{where} position")  # type: ignore[attr-defined]
+        if load.title == "central_gravity":
+            yield from _about_start(scene, body, distance, load.motion_at_start(scene))
 
 
 # --- attracting bodies --------------------------------------------------------------------------------------
 
 
-def about_strength(given: ExactNumber, distance: float, where: str) -> Iterator[Caution]:
+def _named(name: str) -> KnownBody | None:
+    return next((body for body in KNOWN if body.name.lower() == name), None)
+
+
+def _about_strength(given: ExactNumber, distance: float, where: str) -> Iterator[Caution]:
     """A known body's G M in km^3/s^2 without a unit, which the distance (m) makes plausible."""
     body = _in_kilometres(float(given), distance) if given.assumed else None
     if body is not None:
@@ -63,43 +94,24 @@ def about_strength(given: ExactNumber, distance: float, where: str) -> Iterator[
         yield _without_unit(f"{where} gravitational_parameter", given, "m^3/s^2", known, "km^3/s^2")
 
 
-def named_body(name: str) -> KnownBody | None:
-    """The known body that a kernel has by a name."""
-    return next((body for body in KNOWN if body.name.lower() == name), None)
-
-
 def about_named_strength(given: ExactNumber | None, name: str, where: str) -> Iterator[Caution]:
     """A G M given for a body that is named: in km^3/s^2 without a unit, or that of another known body."""
-    body = named_body(name)
+    body = _named(name)
     if body is None or given is None:
         return
-    value, meant = float(given), known_body(float(given))
-    if given.assumed and abs(value * _CUBIC_KILOMETRE / body.gravitational_parameter - 1) < _AS_PUBLISHED:
-        known = f"{body.owner} is {body.gravitational_parameter / _CUBIC_KILOMETRE:.6g} km^3/s^2"
-        yield _without_unit(f"{where} gravitational_parameter", given, "m^3/s^2", known, "km^3/s^2")
-    elif meant is not None and meant is not body:
-        text = (
-            f"{where} gravitational_parameter: given {_number(given)} m^3/s^2, which is {meant.owner}, for "
-        )
-        text += f'"{name}", which has {body.gravitational_parameter:.6g}; correct one of them'
+    meant = known_body(float(given))
+    yield from _about_strength(given, body.radius, where)
+    if meant is not None and meant is not body:
+        text = f"{where} gravitational_parameter: given {_numbers([given])} m^3/s^2, which is {meant.owner}, "
+        text += f'for "{name}", which has {body.gravitational_parameter:.6g}; correct one of them'
         yield Caution(WarningCode.STRENGTH_CONTRADICTS, text)
-
-
-def attracting(given: ExactNumber, distance: float) -> KnownBody | None:
-    """The known body that a gravitational parameter means, possibly by a number in km^3/s^2."""
-    return _meant_body(given) or (_in_kilometres(float(given), distance) if given.assumed else None)
 
 
 def _meant_body(given: ExactNumber) -> KnownBody | None:
     """The known body that a number means, as far as its digits tell: 4e14 the Earth, 4.001736482e14 none."""
-    value = float(given)
-    body = known_body(value)
-    if body is None:
-        return None
-    digits = f"{value:.14e}".partition("e")[0].rstrip("0")
+    digits = f"{float(given):.14e}".partition("e")[0].rstrip("0")
     last = 10.0 ** -(len(digits) - 2) / float(digits)  # the last digit, relative
-    close = abs(value / body.gravitational_parameter - 1) < max(_AS_PUBLISHED, last / 2)
-    return body if close else None
+    return _alike(float(given), max(_AS_PUBLISHED, last / 2))
 
 
 def _in_kilometres(strength: float, distance: float) -> KnownBody | None:
@@ -111,16 +123,16 @@ def _in_kilometres(strength: float, distance: float) -> KnownBody | None:
     return body if any(near) else None
 
 
-def _alike(strength: float) -> KnownBody | None:
+def _alike(strength: float, within: float = _AS_PUBLISHED) -> KnownBody | None:
     body = known_body(strength)
-    close = body is not None and abs(strength / body.gravitational_parameter - 1) < _AS_PUBLISHED
+    close = body is not None and abs(strength / body.gravitational_parameter - 1) < within
     return body if close else None
 
 
 # --- places and orbits --------------------------------------------------------------------------------------
 
 
-def about_distance(
+def _about_distance(
     body: KnownBody | None, distance: float, given: Sequence[ExactNumber], where: str
 ) -> Iterator[Caution]:
     """A distance (m), said by the given numbers, from the centre of a body that lies within it."""
@@ -131,7 +143,7 @@ def about_distance(
     height = "; to an altitude, add the radius" if distance >= _HEIGHT else ""
     meant = [unit for unit, size in _UNITS if body.radius <= distance * size <= _FARTHEST * body.radius]
     if meant and _bare(given):
-        first = next(_number(x) for x in given if x.sign)
+        first = next(f"{float(x):.10g}" for x in given if x.sign)
         text = f"given {_numbers(given)} without a unit, which is taken as m: {below}; write "
         text += f'"{first} {meant[0]}" if that is meant{height}'
         yield Caution(WarningCode.LENGTH_WITHOUT_UNIT, f"{where}: {text}")
@@ -139,7 +151,7 @@ def about_distance(
         yield Caution(WarningCode.BELOW_SURFACE, f"{where}: given {_numbers(given)} m: {below}{height}")
 
 
-def about_radius(fields: Any, where: str) -> Iterator[Caution]:
+def _about_radius(fields: Any, where: str) -> Iterator[Caution]:
     """Radii of a known attracting body in km without a unit: of its altitude and shadow, figure and field."""
     strength = getattr(fields, "gravitational_parameter", None)
     if strength is None or (body := _meant_body(strength)) is None:
@@ -158,13 +170,15 @@ def about_altitude(given: ExactNumber, altitude: float, where: str) -> Iterator[
         yield _without_unit(f"{where} altitude", given, "m", known, "km")
 
 
-def about_start(scene: Scene, body: KnownBody | None, place: Vector, velocity: Vector) -> Iterator[Caution]:
-    """Place and velocity of a body in flight at the start, relative to the attracting body (m, m/s)."""
+def _about_start(
+    scene: Scene, body: KnownBody | None, distance: float, velocity: Vector
+) -> Iterator[Caution]:
+    """Distance (m) and velocity (m/s) of a body in flight at the start from the attracting body."""
     given = scene.config.initial
     if body is None or given.position is None or given.frame is not None:
         return
-    distance, speed = float(norm(scene.context, place)), float(norm(scene.context, velocity))
-    yield from about_distance(body, distance, given.position, "[initial] position")
+    speed = float(norm(scene.context, velocity))
+    yield from _about_distance(body, distance, given.position, "[initial] position")
     if distance < _SURFACE * body.radius or given.velocity is None or not _bare(given.velocity):
         return
     circular = math.sqrt(body.gravitational_parameter / distance)
@@ -173,20 +187,20 @@ def about_start(scene: Scene, body: KnownBody | None, place: Vector, velocity: V
         yield _without_unit("[initial] velocity", given.velocity, "m/s", known, "km/s")
 
 
-def about_orbit(
+def _about_orbit(
     table: Elements, orbit: KeplerOrbit, strength: ExactNumber | None, where: str, scene: Scene
 ) -> Iterator[Caution]:
     """A prescribed orbit as given (``table``) and in numbers: its units, its altitude, and its period."""
     given, axis = table.semi_major_axis, float(orbit.semi_major_axis)
     assert given is not None
     if strength is None:
-        size = implied_strength(orbit)
+        size = float(orbit.mean_motion**2 * orbit.semi_major_axis**3)
         body = _alike(size) or (_in_kilometres(size, axis) if given.assumed else None)
     else:
-        yield from about_strength(strength, axis, where)
-        body = attracting(strength, axis)
+        yield from _about_strength(strength, axis, where)
+        body = _meant_body(strength) or (_in_kilometres(float(strength), axis) if strength.assumed else None)
     at = f"{where} {table.key}"
-    low = list(about_distance(body, float(orbit.pericentre), [given], f"{at}.semi_major_axis"))
+    low = list(_about_distance(body, float(orbit.pericentre), [given], f"{at}.semi_major_axis"))
     yield from low
     if body is None and given.assumed:
         yield from _familiar_axis(given, f"{at}.semi_major_axis")
@@ -218,7 +232,7 @@ def _about_period(
     key = next((key for key in PACES if getattr(table, key) is not None), None)
     if key is None or orbit.mean_motion == 0:
         return
-    needed, least = implied_strength(orbit), float(strength)
+    needed, least = float(orbit.mean_motion**2 * orbit.semi_major_axis**3), float(strength)
     own = scene.body.mass
     most = least + (0.0 if own is None else float(GRAVITATIONAL_CONSTANT) * float(own))
     other = own is None and any(
@@ -239,7 +253,7 @@ def _about_period(
 # --- spins beside an orbit ----------------------------------------------------------------------------------
 
 
-def about_spin(
+def _about_spin(
     table: Elements, orbit: KeplerOrbit, strength: ExactNumber, where: str, scene: Scene
 ) -> Iterator[Caution]:
     """A spin about a principal axis along the normal of an orbit, which is given as ``table``."""
@@ -320,7 +334,7 @@ def _without_unit(
     where: str, given: ExactNumber | Sequence[ExactNumber], taken: str, known: str, meant: str
 ) -> Caution:
     numbers = [given] if isinstance(given, ExactNumber) else given
-    first = next(_number(x) for x in numbers if x.sign)
+    first = next(f"{float(x):.10g}" for x in numbers if x.sign)
     return _taken(where, _numbers(numbers), first, taken, known, meant)
 
 
@@ -338,12 +352,8 @@ def _bare(given: Sequence[ExactNumber]) -> bool:
     return all(x.assumed for x in given if x.sign)
 
 
-def _number(value: ExactNumber) -> str:
-    return f"{float(value):.10g}"
-
-
 def _numbers(given: Sequence[ExactNumber]) -> str:
-    return ", ".join(map(_number, given))
+    return ", ".join(f"{float(x):.10g}" for x in given)
 
 
 def _turn(rate: float) -> str:

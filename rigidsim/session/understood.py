@@ -7,8 +7,9 @@ from rigidsim.model.formulations.formulation import ModelPlan
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.load_estimate import effect_at_start
 from rigidsim.model.load_words import length_text
+from rigidsim.model.loads.kernel_attractor import KernelAttractor
 from rigidsim.model.loads.uniform_gravity import UniformGravity
-from rigidsim.model.plausibility import about_named_strength, about_radius
+from rigidsim.model.plausibility import about_load, about_named_strength
 from rigidsim.model.sources import sources_of
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, norm, working_bits
@@ -169,7 +170,7 @@ def cautions_of(scene: Scene) -> list[Caution]:
     for number, (fields, load) in enumerate(zip(scene.config.loads, scene.given_loads, strict=True), start=1):
         if isinstance(load, Load):
             where = f"[[loads]] number {number}"
-            found += [*load.cautions(fields, where, scene), *about_radius(fields, where)]
+            found += about_load(load, fields, where, scene)
     for number, one in enumerate(scene.config.bodies, start=1):
         if one.ephemeris:
             found += about_named_strength(
@@ -178,6 +179,13 @@ def cautions_of(scene: Scene) -> list[Caution]:
     for load in loads_of(scene):
         if isinstance(load, tuple(LOADS["body"].values())):
             found += load.cautions(scene.config.body, "[body]", scene)
+    named, host = [getattr(fields, "source", None) for fields in scene.config.loads], scene.host
+    if host and host not in named and any(isinstance(load, KernelAttractor) for load in scene.given_loads):
+        text = (
+            f'[body] host: given "{host}", whose own gravity no load has, so that only what others do to it '
+        )
+        text += f'acts; add central_gravity with source = "{host}", unless that is meant'
+        found.append(Caution(WarningCode.HOST_WITHOUT_GRAVITY, text))
     if scene.gravity is not None and not scene.free_flight and scene.torque_arm is None:
         found.append(
             Caution(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -21,17 +20,9 @@ from rigidsim.model.loads.point_attraction import (
     kernel_strength,
 )
 from rigidsim.model.loads.source_figure import FigureFields
-from rigidsim.model.plausibility import (
-    about_named_strength,
-    about_start,
-    about_strength,
-    attracting,
-    named_body,
-)
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
 from rigidsim.scene.bodies.gravity_field import MOST, Harmonic
-from rigidsim.scene.cautions import Caution
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import (
     Angle,
@@ -269,15 +260,3 @@ class CentralGravity(PointAttraction):
             reach = min(farthest, distance + swiftest * horizon) + fed * horizon
             return norm(context, self.position) + reach, swiftest + fed
         return norm(context, scene.position) + (swiftest + fed) * horizon, swiftest + fed
-
-    def cautions(self, fields: CentralGravityFields, where: str, scene: Scene) -> Iterator[Caution]:
-        given, name = fields.gravitational_parameter, fields.source
-        offset, distance, _ = self._start(scene)
-        if name is not None:
-            yield from about_named_strength(given, name, where)
-            body = named_body(name)
-        else:
-            assert given is not None
-            yield from about_strength(given, float(distance), where)
-            body = attracting(given, float(distance))
-        yield from about_start(scene, body, offset, scene.velocity or [])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -22,7 +21,6 @@ from rigidsim.model.placements.series import PlacedBySeries
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, norm
-from rigidsim.scene.cautions import Caution
 from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.fields import BodyName, GravitationalParameter, Metre, Positive, Triple, one_of
 from rigidsim.scene.kernels.reading import Sight
@@ -203,7 +201,3 @@ class GravityGradient(GradientSource, Load):  # type: ignore[override]
 
     def fastest_rate(self, scene: Scene) -> Any:
         return self.placement.fastest_rate(scene.context)
-
-    def cautions(self, fields: GravityGradientFields, where: str, scene: Scene) -> Iterator[Caution]:
-        given = fields.gravitational_parameter
-        yield from self.placement.cautions(fields, given, where, scene)

@@ -11,7 +11,6 @@ nothing accelerates.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,10 +19,8 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Term
 from rigidsim.model.loads.point_attraction import PointAttraction
 from rigidsim.model.placements.kernel_body import PlacedByKernel, kernel_body
-from rigidsim.model.plausibility import about_named_strength, about_start, named_body
 from rigidsim.model.rotations import Symbolic, length
 from rigidsim.scene.arithmetic import Vector, dot, norm, unit_vectors
-from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
@@ -131,15 +128,3 @@ class KernelAttractor(PointAttraction):
 
     def fastest_rate(self, scene: Scene) -> Any:
         return self.placement.fastest_rate(scene.context)
-
-    def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
-        name, host = self.placement.name, self.placement.sight.host
-        yield from about_named_strength(fields.gravitational_parameter, name, where)
-        place = self._apart(scene.context, scene.position or [])
-        yield from about_start(scene, named_body(name), place, self.motion_at_start(scene))
-        first = next(x for x in scene.given_loads if isinstance(x, KernelAttractor))
-        named = [getattr(keys, "source", None) for keys in scene.config.loads]
-        if host and first is self and host not in named:
-            text = f'[body] host: given "{host}", whose own gravity no load has, so that only what others do '
-            text += f'to it acts; add central_gravity with source = "{host}", unless that is meant'
-            yield Caution(WarningCode.HOST_WITHOUT_GRAVITY, text)

@@ -18,13 +18,11 @@ from rigidsim.model.load import Load, SourcePlace, loads_of
 from rigidsim.model.load_words import length_text, value_text
 from rigidsim.model.loads.central_gravity import CentralGravity
 from rigidsim.model.loads.earth_field import IGRF, EarthField
-from rigidsim.model.plausibility import about_orbit
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.sources import free_flight, in_body_axes, read_in
 from rigidsim.model.two_part import rounded
 from rigidsim.scene.arithmetic import Vector, dot, norm
 from rigidsim.scene.bodies.presets import EARTH
-from rigidsim.scene.cautions import Caution
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import PLACES, NameProvider, Readable, provides
@@ -341,10 +339,6 @@ class InMagneticField(Load):
         if self.place is not None:
             return norm(scene.context, scene.velocity or []) / self._far(scene)
         return scene.context.zero if self.orbit is None else self.orbit.fastest_rate(scene.context)
-
-    def cautions(self, fields: MagneticFieldFields, where: str, scene: Scene) -> Iterator[Caution]:
-        if self.orbit is not None and fields.elements is not None:
-            yield from about_orbit(fields.elements, self.orbit, fields.gravitational_parameter, where, scene)
 
 
 @provides

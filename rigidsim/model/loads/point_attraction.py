@@ -8,7 +8,6 @@ the body itself is one of the point masses, their mutual gravity includes its at
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -21,10 +20,8 @@ from rigidsim.model.orbit_planes import OrbitPlane
 from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.model.placements.kernel_body import kernel_body
 from rigidsim.model.placements.point_mass import PlacedAsMass
-from rigidsim.model.plausibility import about_start, about_strength, attracting
 from rigidsim.model.rotations import Symbolic, apply, length, transpose, unit
-from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
-from rigidsim.scene.cautions import Caution
+from rigidsim.scene.arithmetic import Vector, cross, unit_vectors
 from rigidsim.scene.kernels.series import exactly
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, PointMasses, closest
 from rigidsim.scene.registry import Setting
@@ -134,7 +131,6 @@ class MovingSource(PointAttraction):
     number: int  # index of the one that attracts
     reacts = True
     as_points: ClassVar[bool] = False  # whether it attracts the body as a point, too
-    felt: ClassVar[str]  # by the masses under full coupling
 
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
@@ -224,22 +220,11 @@ class MovingSource(PointAttraction):
     def fastest_rate(self, scene: Scene) -> Any:
         return self.encounter(scene)[1]
 
-    def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
-        given, distance = self._given(scene)
-        if given is not None:  # rather than a kernel's
-            yield from about_strength(given, distance, f"[[bodies]] number {self.number + 1}")
-
-    def _given(self, scene: Scene) -> tuple[Any, float]:
-        """The strength as it was given, and the distance at the start, m."""
-        given = scene.config.bodies[self.number].gravitational_parameter
-        return given, float(norm(scene.context, self.start(scene)[0]))
-
 
 class MovingGradient(MovingSource):
     """The torque of a point mass on a body that is a point mass itself, or flies without its force."""
 
     title = "gravity_gradient"
-    felt = "; the bodies feel its shape"
 
     @property
     def gradient_source(self) -> GradientSource | None:
@@ -254,19 +239,12 @@ class MovingAttractor(MovingSource):
 
     title = "central_gravity"
     as_points = True
-    felt = "; the bodies feel the forces of this one"
 
     def force(self, m: Kinematics) -> list[Term]:
         return list(zip(unit_vectors(m.scene.context), self.acceleration(m), strict=True))
 
     def potential(self, m: Kinematics) -> Symbolic | None:
         return -self.second_degree(m) - self.as_point(m)
-
-    def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
-        yield from super().cautions(fields, where, scene)
-        given, distance = self._given(scene)
-        if given is not None:
-            yield from about_start(scene, attracting(given, distance), *self.start(scene))
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -13,10 +13,8 @@ import numpy as np
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion
-from rigidsim.model.plausibility import about_named_strength
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector
-from rigidsim.scene.cautions import Caution
 from rigidsim.scene.kernels.ephemeris import Ephemeris
 from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.registry import Setting
@@ -157,9 +155,6 @@ class PlacedByKernel(Placement):
         if np.abs(latitude).max() > _LEAST_SHAPE:
             slow += abs(_rate(times[1:][above[1:] & ~above[:-1]], motion) - motion)
         return Circuit(motion, e, (2.0**self.sight.exponent / float(far.min())) ** 3, slow)
-
-    def cautions(self, fields: Any, given: Any, where: str, scene: Scene) -> Iterator[Caution]:
-        yield from about_named_strength(given, self.name, where)
 
     def pictured(self) -> dict[str, Any]:
         return {"kernel": self.name}

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -15,12 +14,10 @@ from rigidsim.model.orbit_planes import OrbitPlane
 from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector
-from rigidsim.scene.cautions import Caution
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
-from rigidsim.scene.registry import LoadFields
 from rigidsim.scene.scene import Scene
 
 
@@ -134,9 +131,3 @@ class Placement(ABC):
     def pictured(self) -> dict[str, Any]:
         """What a timeline draws it by (``rigidsim.look.record``)."""
         return {}
-
-    def cautions(self, fields: LoadFields, given: Any, where: str, scene: Scene) -> Iterator[Caution]:
-        """Values of the load's keys that are allowed, but probably mean something else; ``given`` is the
-        gravitational parameter as it was given.
-        """
-        yield from ()

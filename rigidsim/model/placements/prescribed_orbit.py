@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,10 +11,8 @@ import heyoka as hy
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.orbits.kepler_motion import KeplerParts
 from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion
-from rigidsim.model.plausibility import about_distance, about_orbit, about_spin, about_strength, attracting
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, norm
-from rigidsim.scene.cautions import Caution
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
@@ -58,11 +54,6 @@ class PlacedAtRest(Placement):
 
     def pictured(self) -> dict[str, Any]:
         return {"position": [float(x) for x in self.position]}
-
-    def cautions(self, fields: Any, given: Any, where: str, scene: Scene) -> Iterator[Caution]:
-        distance = math.hypot(*map(float, fields.position))
-        yield from about_strength(given, distance, where)
-        yield from about_distance(attracting(given, distance), distance, fields.position, f"{where} position")
 
 
 @dataclass(frozen=True)
@@ -106,10 +97,6 @@ class PlacedOnOrbit(Placement):
     def pictured(self) -> dict[str, Any]:
         names = [field.name for field in dataclasses.fields(self.orbit)]
         return {"orbit": {name: float(getattr(self.orbit, name)) for name in names}}
-
-    def cautions(self, fields: Any, given: Any, where: str, scene: Scene) -> Iterator[Caution]:
-        yield from about_orbit(fields.elements, self.orbit, given, where, scene)
-        yield from about_spin(fields.elements, self.orbit, given, where, scene)
 
 
 @dataclass(frozen=True)
