@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import zip_longest
 from pathlib import Path
 
 import heyoka as hy
@@ -37,11 +38,7 @@ def rotation_vectors(one: list[np.ndarray], other: list[np.ndarray]) -> np.ndarr
     of another; given as float64 parts (n, 4) of quaternions, and subtracted before anything is rounded.
     """
     sign = np.where(np.einsum("ij,ij->i", one[0], other[0]) < 0, -1.0, 1.0)[:, None]
-    apart = np.zeros_like(one[0])
-    for n in range(max(len(one), len(other))):
-        a = one[n] if n < len(one) else 0.0
-        b = other[n] if n < len(other) else 0.0
-        apart = apart + (sign * b - a)
+    apart = _differences(one, [sign * part for part in other])
     w, v, dw, dv = one[0][:, :1], one[0][:, 1:], apart[:, :1], apart[:, 1:]
     sine = w * dv - dw * v - np.cross(v, dv)  # vector part of conj(q) dq; that of conj(q) q is zero
     cosine = 1.0 + (w * dw)[:, 0] + np.einsum("ij,ij->i", v, dv)
@@ -52,13 +49,16 @@ def rotation_vectors(one: list[np.ndarray], other: list[np.ndarray]) -> np.ndarr
 
 def axis_vectors(one: list[np.ndarray], other: list[np.ndarray]) -> np.ndarray:
     """The same of directions (n, 3): the smallest rotations, in space axes, that take one to the other."""
-    apart = np.zeros_like(one[0])
-    for n in range(max(len(one), len(other))):
-        apart = apart + ((other[n] if n < len(other) else 0.0) - (one[n] if n < len(one) else 0.0))
+    apart = _differences(one, other)
     sine = np.cross(one[0], apart)
     size = np.linalg.norm(sine, axis=1)
     angle = np.arctan2(size, 1.0 + np.einsum("ij,ij->i", one[0], apart))
     return sine * np.where(size > 0, angle / np.where(size > 0, size, 1.0), 1.0)[:, None]
+
+
+def _differences(one: list[np.ndarray], other: list[np.ndarray]) -> np.ndarray:
+    pairs = zip_longest(one, other, fillvalue=np.zeros_like(one[0]))
+    return np.sum([b - a for a, b in pairs], axis=0)
 
 
 @dataclass(frozen=True)
