@@ -255,7 +255,7 @@ def wobble_and_spin(dataset: xarray.Dataset) -> Plot | None:
     azimuth = np.unwrap(np.arctan2(pole @ second, pole @ first))
     spin = sources.integrated(signals.seconds(dataset), rates @ scene.figure)
     turns = np.abs(np.stack([azimuth - azimuth[0], spin], axis=1)) / _TURN
-    labels = ("the axis about the angular momentum: the wobble", "the body about its axis: the spin")
+    labels = ("wobble: the axis about the momentum", "spin: the body about its axis")
     title = f"In space: {turns[-1, 0] / turns[-1, 1]:.3f} turns of the wobble to one of the spin"
     return Plot("wobble_and_spin", title, turns, labels, word="turns")
 

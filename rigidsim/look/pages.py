@@ -15,6 +15,7 @@ from rigidsim.look.units import angle_text, turning_text
 from rigidsim.scene.readable import TimeWords, span_text
 
 Names = list[str]
+_STEADY = 0.3  # of the largest rate, above which a body is said to turn at its mean rate
 _LEAST = 1e-9  # rad, of a longitude's advance, below which it is rounding
 _GLYPHS = (
     (0x20, 0x7E), (0xA0, 0x148), (0x14A, 0x1C3), (0x1C5, 0x31E), (0x384, 0x38A), (0x38E, 0x3A1),
@@ -77,12 +78,9 @@ def numbers(rows: xarray.Dataset) -> list[tuple[str, str]]:
     seconds, rates = signals.seconds(rows), signals.values(rows, "angular_velocity", 3)
     if len(seconds) < 3:
         return found
-    if (
-        rates is not None
-        and np.isfinite(rates).any()
-        and (size := float(np.nanmean(signals.norms(rates)))) > 0
-    ):
-        found.append(("turns once in", span_text(2 * np.pi / size, 5)))
+    size = np.zeros(1) if rates is None else signals.norms(signals.finite_rows(rates))
+    if rates is not None and len(size) and size.min() > _STEADY * size.max():
+        found.append(("turns once in", span_text(2 * np.pi / float(size.mean()), 5)))
         flips = _flips(seconds, signals.finite_rows(rates))
         found += [("between flips", span_text(flips, 4))] if flips else []
     plane = (
@@ -99,7 +97,8 @@ def numbers(rows: xarray.Dataset) -> list[tuple[str, str]]:
     elif precesses(rows):
         name, (_, node) = next(iter(orientations(rows).items()))
         mean = secular(seconds, node)
-        if abs(mean.rate) * np.ptp(seconds) > _LEAST and np.isfinite(node).all():
+        stray = float(np.nanmax(np.abs(node - mean.at(seconds))))
+        if mean.known and abs(mean.rate) * np.ptp(seconds) > max(stray, _LEAST):
             found.append((f"{name} axis precesses in", mean.about + span_text(2 * np.pi / abs(mean.rate), 4)))
     for name, words in (("tilt", "tilt"), ("nutation_angle", "nutation angle"), ("obliquity", "obliquity")):
         table = signals.values(rows, name)

@@ -1,7 +1,7 @@
 """What is drawn over time, as values with labels, a unit and colours: one form for figures and timelines."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,6 @@ HUES: dict[str, tuple[str, Color]] = {
 XYZ = ("red", "green", "blue")
 PALETTE = ("blue", "orange", "violet", "green", "red", "teal", "brown", "grey", "pink")
 _STILL = 1e-9  # of a curve's size, below which what it does is rounding
-_TOGETHER = 3e-3  # of a curve's range: what lies nearer is covered by its line
 _SEEN = 2e-3  # of a curve's range: a narrower band is no wider than the line
 _MOST_CURVES = 16  # of one variable, so that a recorded matrix history stays readable
 TYPICAL, MOST = 0.5, 50.0
@@ -134,7 +133,7 @@ def drift_plot(dataset: xarray.Dataset) -> Plot | None:
     band, law = None, rounding_law(dataset)
     if law is not None:
         band = TYPICAL * law, MOST * law
-    title = "Drift of invariants" + (" (grey: what rounding explains)" if band else "")
+    title = "Drift of invariants"
     table = np.stack(columns, axis=1)
     return Plot(
         "drift",
@@ -195,31 +194,7 @@ def variable_plot(dataset: xarray.Dataset, variable: xarray.DataArray, place: st
     title = name[:1].upper() + name[1:].replace("_", " ")
     if "angle" in variable.attrs and "angles_wrapped_from" in dataset.attrs:
         title += " within one turn"
-    plot = Plot(name, title, table / divisor, labels, unit, hues, place=place, recorded=divisor)
-    return replace(plot, **_told_apart(plot)) if dimension == "axis" else plot
-
-
-def _told_apart(plot: Plot) -> dict[str, Any]:
-    """Of axes that coincide only the first, with all their names, since the last would cover the others."""
-    kept: list[int] = []
-    names: list[str] = []
-    for column, label in enumerate(plot.labels):
-        shown = plot.values[np.isfinite(plot.values[:, column])]
-        near = _TOGETHER * np.ptp(shown[:, column]) if len(shown) else -1.0
-        same = [
-            k for k, c in enumerate(kept) if np.abs(shown[:, column] - shown[:, c]).max(initial=0) <= near
-        ]
-        if same:
-            names[same[0]] += f", {label}"
-        else:
-            kept.append(column)
-            names.append(label)
-    return {
-        "values": plot.values[:, kept],
-        "labels": names,
-        "hues": [plot.hues[k] for k in kept],
-        "recorded": 0.0,
-    }
+    return Plot(name, title, table / divisor, labels, unit, hues, place=place, recorded=divisor)
 
 
 def _along_time(dataset: xarray.Dataset) -> Iterator[xarray.DataArray]:

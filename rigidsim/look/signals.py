@@ -100,10 +100,13 @@ def aliased(dataset: xarray.Dataset, rates: float = 1.0) -> bool:
 
 
 def wobble_aliased(dataset: xarray.Dataset) -> bool:
-    """Whether rows are too far apart for the free wobble about the axis of largest or least moment."""
-    moments = scene_of(dataset).moments
+    """Whether rows are too far apart for the free wobble about the axis of largest or least moment, or for
+    one that torques force, which goes round in a turn of the body.
+    """
+    moments, forced = scene_of(dataset).moments, pole(dataset, "momentum") is not None
     a, b, c = np.ones(3) if moments is None else np.sort(moments)
-    return aliased(dataset, float(np.sqrt(max((c - a) * (c - b) / (a * b), (c - a) * (b - a) / (c * b)))))
+    free = float(np.sqrt(max((c - a) * (c - b) / (a * b), (c - a) * (b - a) / (c * b))))
+    return aliased(dataset, 1.0 if forced and steady_momentum(dataset) is None else free)
 
 
 def axis_names(dataset: xarray.Dataset) -> list[str]:

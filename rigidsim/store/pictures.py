@@ -46,13 +46,13 @@ def draw(
     share = film.PICTURED_AT if at is None else _share(dataset, at)
     from rigidsim.look.timeline import write_timeline  # which loads rerun, see look.viewer
 
+    size = (_GIF_SIZES if target.suffix.lower() == ".gif" else _SIZES)[part]
     with tempfile.TemporaryDirectory(prefix="rigidsim-view-") as scratch:
         recording = Path(scratch) / "timeline.rrd"
         try:
-            write_timeline(dataset, recording, part=part)
+            write_timeline(dataset, recording, part=part, height=size[1])
         except (OSError, RuntimeError, ValueError) as error:
             raise RunFolderError(f"{target}: can't be drawn: {error}") from None
-        size = (_GIF_SIZES if target.suffix.lower() == ".gif" else _SIZES)[part]
         draw_recording(recording, target, seconds=seconds, told=told, at=share, size=size)
 
 

@@ -58,7 +58,7 @@ def draw_plot(axes: Axes, dataset: xarray.Dataset, plot: Plot) -> None:
         axes.set_ylim(*plot.steady)
     if plot.from_zero:
         axes.set_ylim(0.0, 1.1 * axes.get_ylim()[1])
-    key(axes, plot.title)
+    key(axes, plot.title + (" (grey: what rounding explains)" if plot.band else ""))
     axes.set_ylabel(with_unit(plot.word, plot.unit))
 
 

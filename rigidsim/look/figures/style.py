@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import xarray
-from matplotlib import colormaps, rc_context
+from matplotlib import colormaps, rc_context, rcParams
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
@@ -131,7 +131,7 @@ def blank(dataset: xarray.Dataset, width: float, height: float) -> Figure:
 def titled(axes: Axes, title: str, *, rows: int = 0) -> None:
     """Set a panel's title, broken to its width, with room below for a key of so many rows."""
     text = textwrap.fill(title, max(int(_room(axes) / _TITLE_LETTER), 20))
-    axes.set_title(text, pad=7.0 + (3.0 + rows * _KEY_ROW if rows else 0.0))
+    axes.set_title(text, pad=7.0 + (3.0 + rows * _KEY_ROW * _larger() if rows else 0.0))
 
 
 def key(axes: Axes, title: str, *, handles: Sequence[Any] | None = None) -> None:
@@ -142,7 +142,8 @@ def key(axes: Axes, title: str, *, handles: Sequence[Any] | None = None) -> None
         titled(axes, title)
         return
     widths = [len(re.sub(r"[${}_\\]", "", label)) * _KEY_LETTER + 24.0 for label in labels]
-    fits = len(found) if sum(widths) <= _room(axes) else int(_room(axes) // max(widths))
+    room = _room(axes)
+    fits = len(found) if sum(widths) <= room else int(room // max(widths))
     columns = max(1, min(len(found), fits))
     titled(axes, title, rows=-(-len(found) // columns))
     legend = axes.legend(
@@ -154,8 +155,13 @@ def key(axes: Axes, title: str, *, handles: Sequence[Any] | None = None) -> None
 
 
 def _room(axes: Axes) -> float:
-    """Approximate width of a panel in points, before the page is laid out."""
-    return float(axes.get_position().width * axes.figure.bbox.width / axes.figure.dpi * 72.0 * 1.1)
+    """Approximate width of a panel in points, before the page is laid out, for letters of the usual size."""
+    return float(axes.get_position().width * axes.figure.bbox.width / axes.figure.dpi * 79.2 / _larger())
+
+
+def _larger() -> float:
+    """How many times larger letters are than on a page, as on slides."""
+    return float(rcParams["legend.fontsize"]) / float(STYLE["legend.fontsize"])
 
 
 def curve(
@@ -191,9 +197,8 @@ def trace(axes: Axes, x: Array, y: Array, *, sparse: bool = False) -> None:
         return
     first, label = _first_turns(points)
     if first:
-        rest = "the rest" if label else None
-        axes.plot(x[:first], y[:first], color=BLUE, lw=1.5, zorder=3, label=label or None)
-        axes.plot(x[first - 1 :], y[first - 1 :], color=PALE, lw=0.8, label=rest, rasterized=many)
+        axes.plot(x[:first], y[:first], color=BLUE, lw=1.5, zorder=3, label=label)
+        axes.plot(x[first - 1 :], y[first - 1 :], color=PALE, lw=0.8, label="the rest", rasterized=many)
         return
     # In pieces of one colour: a line per sample would be tens of thousands of objects.
     pieces = min(200, max(len(x) - 1, 1))
@@ -217,8 +222,6 @@ def _first_turns(points: Array) -> tuple[int, str]:
     radius = np.hypot(*points.T)
     if radius[:rows].max() < 0.6 * radius.max():  # it spirals out of the centre
         return int(np.flatnonzero(radius > 0.98 * radius.max())[0]) + 2, "first way out"
-    if np.ptp(radius) < 1e-3 * radius.max():  # all turns are one circle
-        return rows, ""
     return rows, "first turn" if count == 1 else f"first {count} turns"
 
 

@@ -192,32 +192,22 @@ def camera(stage: Stage, *, narrow: bool = False, subject: Subject | None = None
     if stage.translation is not None and not stage.arrows:
         elevation, azimuth = plane_view(stage.translation)
     space = [arrow for arrow in stage.arrows if not arrow.in_body] or stage.arrows
-    leading = None
     if space:
         leading = np.nanmean(space[0].vectors, axis=0)
         if np.hypot(leading[0], leading[1]) > 0.3 * np.linalg.norm(leading):
             azimuth = np.arctan2(leading[1], leading[0]) - np.deg2rad(48.0)
     if subject is not None and subject.attitude is not None and subject.thin_axis is not None:
-        elevation, azimuth = _facing(subject.attitude @ subject.thin_axis, leading)
+        elevation, azimuth = _facing(subject.attitude @ subject.thin_axis)
     return eye_at(elevation, azimuth, radius, target, narrow=narrow)
 
 
-def _facing(normals: Array, leading: Array | None) -> tuple[float, float]:
-    """Elevation and azimuth (rad) from which a plate with normals (rows, 3) shows its face, and the leading
-    arrow (3,) isn't seen end on.
-    """
-    normals = signals.finite_rows(normals[:: max(len(normals) // 200, 1)])
-    if not len(normals):
-        return USUAL_VIEW
-    along = np.zeros(3) if leading is None else leading / (np.linalg.norm(leading) or 1.0)
-    tried = [(e, a) for e in np.deg2rad((20.0, 30.0, 42.0)) for a in np.deg2rad(np.arange(0.0, 360.0, 15.0))]
-    directions = np.array([direction_of(*angles) for angles in tried])
-    shown = np.abs(normals @ directions.T)
-    # about 55 degrees from the arrow neither it nor the circles about it are seen end on
-    score = shown.mean(axis=0) + 0.5 * np.minimum(shown[0], 0.6)
-    score -= 1.2 * (np.abs(directions @ along) - 0.57) ** 2 if along.any() else 0.0
-    elevation, azimuth = tried[int(score.argmax())]
-    return float(elevation), float(azimuth)
+def _facing(normals: Array) -> tuple[float, float]:
+    """Elevation and azimuth (rad) from which a plate with normals (rows, 3) shows its face most often."""
+    normals = signals.finite_rows(normals)
+    _, ways = np.linalg.eigh(normals.T @ normals)
+    way = ways[:, -1] * (1.0 if ways[2, -1] >= 0 else -1.0)
+    elevation = np.clip(np.arcsin(way[2]), np.deg2rad(20.0), np.deg2rad(42.0))
+    return float(elevation), float(np.arctan2(way[1], way[0]) + np.deg2rad(20.0))
 
 
 def plane_view(points: Array) -> tuple[float, float]:

@@ -25,7 +25,9 @@ PLAYER = "player"
 _CURVES = 6  # of runs side by side: more names would cover the curves
 
 
-def build_blueprint(run: DrawnRun, *, following: bool = False, part: str | None = None) -> rrb.Blueprint:
+def build_blueprint(
+    run: DrawnRun, *, following: bool = False, part: str | None = None, height: float = PIXELS
+) -> rrb.Blueprint:
     """The layout for a run, which opens at its start and plays, or stays at the end of one that goes on; of a
     picture one of ``PARTS``, without the viewer's own bars; or ``PLAYER``.
     """
@@ -41,7 +43,7 @@ def build_blueprint(run: DrawnRun, *, following: bool = False, part: str | None 
     shares = [3.0] * len(spaces) + [2.6 if facing else 1.6] * len(beside)
     scene = spaces[0] if len(shares) == 1 else rrb.Horizontal(*spaces, *beside, column_shares=shares)
     pages = {page.lower(): page for page in run.pages if part is None or (part, page) == ("page", "Summary")}
-    height = PIXELS / 2 if part == PLAYER else PIXELS
+    height = height / 2 if part == PLAYER else height
     left = left_side(scene, entities.legend_of(stages), pages, height)
     views = {
         place: [plot_view([plot], clock) for plot in run.plots if plot.place == place]

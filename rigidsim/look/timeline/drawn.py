@@ -206,6 +206,7 @@ class DrawnRun:
 def _about(rows: xarray.Dataset, extremes: xarray.Dataset, picture: Picture) -> tuple[list[Plot], list[Path]]:
     """Plots, what the scene is about first, and paths in planes; of what was recorded with extremes."""
     curves, planes = leading(rows)
+    planes = [name for name in planes if name in PATHS and name != "herpolhode"]  # which a stage has
     found = [plot for name in curves if (plot := CURVES[name](rows)) is not None]
     first = [*found[:1], *picture.plots, *found[1:]][:MOST_LEADING]
     first = [
@@ -216,5 +217,5 @@ def _about(rows: xarray.Dataset, extremes: xarray.Dataset, picture: Picture) -> 
     ]
     drift = drift_plot(extremes)
     others = other_plots(extremes, [plot.name for plot in first])
-    paths = [path for name in planes if name in PATHS and (path := PATHS[name](rows)) is not None]
+    paths = [path for name in planes if (path := PATHS[name](rows)) is not None]
     return [*first, *others, *([drift] if drift else [])], paths

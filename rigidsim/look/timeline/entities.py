@@ -27,8 +27,6 @@ _EDGE: Color = (12, 14, 20)
 _AXIS_COLORS = [(235, 70, 60), (90, 200, 90), (80, 130, 250)]
 _CLEAR = 46  # of 255: of a cone, through which labels are read
 _DIM = 0.26  # of a trail's brightness: the whole curve
-PIXELS = 500  # about the width of a plot
-_SMOOTH = 0.01  # of a curve's range, by which it may move within a pixel
 CLOCK_ROWS = 2000  # largest number of rows of the clock on the screen
 _INK: Color = (205, 210, 218)
 _FAINT: Color = (90, 96, 108)
@@ -306,21 +304,11 @@ def shown_values(plot: Plot) -> Array:
 
 
 def aggregation(plot: Plot) -> rr.components.AggregationPolicy:
-    """Which of the rows that fall into one pixel the viewer draws: their average, which is smooth, where no
-    curve moves by more than a hundredth of its own range within a pixel; else the extremes, as an average
-    would show a fast rotation with a vanishing amplitude. Of a drift only the largest counts.
+    """What the viewer draws of rows that fall into one pixel: the extremes, as an average would show a fast
+    rotation with a vanishing amplitude; of a drift only the largest counts.
     """
-    policies, values = rr.components.AggregationPolicy, plot.values
-    if plot.place == "drift":
-        return policies.Max
-    step = len(values) // PIXELS
-    if step < 2:
-        return policies.Average  # each row has a pixel of its own
-    parts = np.arange(0, len(values), step)
-    low, high = np.fmin.reduceat(values, parts), np.fmax.reduceat(values, parts)
-    ranges = np.fmax.reduce(high) - np.fmin.reduce(low)
-    moved = np.fmax.reduce(high - low)
-    return policies.Average if (moved <= _SMOOTH * ranges)[np.isfinite(moved)].all() else policies.MinMax
+    policies = rr.components.AggregationPolicy
+    return policies.Max if plot.place == "drift" else policies.MinMax
 
 
 def draw_paths(recording: rr.RecordingStream, paths: Sequence[Path]) -> None:

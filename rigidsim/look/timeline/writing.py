@@ -19,7 +19,7 @@ from rigidsim.look.pages import legible
 from rigidsim.look.plots import HUES, PALETTE, Plot
 from rigidsim.look.signals import title_of, values
 from rigidsim.look.solids import Array, Color
-from rigidsim.look.timeline.blueprint import build_blueprint, build_comparison
+from rigidsim.look.timeline.blueprint import PIXELS, build_blueprint, build_comparison
 from rigidsim.look.timeline.drawn import Clock, DrawnRun, build_clock, dated
 from rigidsim.scene.parts_of_values import in_time_order
 from rigidsim.scene.readable import epoch_of
@@ -35,7 +35,12 @@ _FLOOR = 1e-18  # rad: below what a difference of attitudes in double precision 
 
 
 def write_timeline(
-    dataset: xarray.Dataset, path: Path, *, rows: int = 100_000, part: str | None = None
+    dataset: xarray.Dataset,
+    path: Path,
+    *,
+    rows: int = 100_000,
+    part: str | None = None,
+    height: float = PIXELS,
 ) -> int:
     """Write a dataset as a rerun recording with its own layout; returns the number of rows written.
 
@@ -46,6 +51,7 @@ def write_timeline(
     rows: at most so many rows are shown, evenly strided, with the first and the last.
     part: of the page that a picture shows, "page", "scene" or "plots", without the viewer's own bars;
     or "player", for a small frame within another page.
+    height: of the picture, points of the screen, of which letters take as many on any.
 
     Raises:
     ValueError: no samples, a time that isn't finite, `rows` < 2 or an unreadable `drawing`.
@@ -54,7 +60,9 @@ def write_timeline(
     """
     run = DrawnRun.of(in_time_order(dataset), rows)
     count = len(run.steps)
-    with recording_to(path, title_of(dataset), count, build_blueprint(run, part=part)) as recording:
+    with recording_to(
+        path, title_of(dataset), count, build_blueprint(run, part=part, height=height)
+    ) as recording:
         run.draw_static(recording)
         for piece in chunks(0, count):
             check_room(path, count - piece.start)
