@@ -80,8 +80,8 @@ def polar_motion(dataset: xarray.Dataset) -> Path | None:
     title = "Polar motion" + ("" if sparse else once_round(dataset, plane, 5)) + ", "
     title += f"{angle_text(least, like=most)} to " if most - least > 1e-3 * most else ""
     title += angle_text(most)
-    labels = {"unit": unit, "hue": "pink", "center": "figure axis"}
-    return Path("polar_motion", title, plane / scale, "m₁", "m₂", **labels, sparse=sparse)
+    points = plane / scale
+    return Path("polar_motion", title, points, "m₁", "m₂", unit, "pink", "figure axis", sparse=sparse)
 
 
 def pole_path(dataset: xarray.Dataset) -> Path | None:
@@ -106,8 +106,8 @@ def pole_path(dataset: xarray.Dataset) -> Path | None:
                 paths[name] = np.stack([tilt * np.sin(node), -tilt * np.cos(node)], axis=1)
     if not paths:
         return None
-    first, *rest = paths
-    shown = paths[first]
+    leading, *rest = paths
+    shown = paths[leading]
     reach = max(float(np.nanmax(np.abs(shown - np.nanmean(shown, axis=0)))), 1e-300)
     others = {n: paths[n] for n in rest if not np.nanmax(np.abs(paths[n] - shown)) < _SAME * reach}
     if np.nanmin(signals.norms(shown)) > 3 * reach:  # so far that it would press the path flat
@@ -179,9 +179,9 @@ def nadir(dataset: xarray.Dataset) -> Path | None:
     plane = flat(*(directions[:, [i, j, k]] * np.sign(mean[k])).T)
     scale, unit = angle_scale(plane)
     sign = "" if mean[k] > 0 else "−"
-    names = (f"towards {sign}{'xyz'[axis]}" for axis in (i, j))
+    across, up = (f"towards {sign}{'xyz'[axis]}" for axis in (i, j))
     center = f"{sign}{'xyz'[k]} axis"
-    return Path("nadir", "The source seen from the body", plane / scale, *names, unit, center=center)
+    return Path("nadir", "The source seen from the body", plane / scale, across, up, unit, center=center)
 
 
 def sub_source(dataset: xarray.Dataset) -> Path | None:
@@ -234,10 +234,10 @@ def sections(dataset: xarray.Dataset) -> list[Path]:
             # the origin is their middle, which the names tell: a small section would be a dot far off
             points = table[:, [one, other]] / divisor
             middle = (points.min(axis=0) + points.max(axis=0)) / 2
-            names = (f"{labels[k]} − {at:.4g}" for k, at in zip((one, other), middle, strict=True))
+            across, up = (f"{labels[k]} − {at:.4g}" for k, at in zip((one, other), middle, strict=True))
             title = f"Section at {event}: {name.replace('_', ' ')}"
             found.append(
-                Path(f"section_{event}", title, points - middle, *names, unit, "orange", moves=False)
+                Path(f"section_{event}", title, points - middle, across, up, unit, "orange", moves=False)
             )
             break
     return found

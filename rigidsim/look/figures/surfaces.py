@@ -391,8 +391,9 @@ def draw_sphere(axes: Axes, dataset: xarray.Dataset, found: Sphere) -> None:
     saddles = np.array([one.direction for one in gyrostat.equilibria if one.unstable])
     if len(saddles):
         heights = np.unique(gyrostat.energy(saddles))
-        for side, style in zip(sides, ({"linewidths": 1.3, "zorder": 3}, {"alpha": 0.25}), strict=True):
-            axes.contour(right, up, side, heights, **{"colors": INK, "linewidths": 0.7, "zorder": 1} | style)
+        for side, width, alpha, height in zip(sides, (1.3, 0.7), (1.0, 0.25), (3.0, 1.0), strict=True):
+            drawn = axes.contour(right, up, side, heights, colors=INK, linewidths=width, alpha=alpha)
+            drawn.set_zorder(height)
         entries.append(Line2D([], [], color=INK, lw=1.3, label="separatrix"))
     path(axes, view, found.directions, visible(found.directions, view, _ONES))
     for square, marker, color, label in _KINDS:

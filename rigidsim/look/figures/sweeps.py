@@ -261,10 +261,10 @@ def _lines(dataset: xarray.Dataset, variable: xarray.DataArray, kept: list[Axis]
     labels = [" ".join(parts) for parts in product(*named)]
     order = np.argsort(axis.place, kind="stable")
     table = np.asarray(variable.transpose(axis.dim, *rest).values, dtype=np.float64).reshape(len(order), -1)
-    marks = {"marker": "o", "ms": 3.2} if len(order) <= 100 or not axis.ordered else {}
+    marks: dict[str, Any] = {"marker": "o", "ms": 3.2} if len(order) <= 100 or not axis.ordered else {}
     for column, label, color in zip(table.T[:_MOST_LINES], labels, PALETTE * 2, strict=False):
-        told = {"label": label if len(labels) > 1 else None, "color": color, "lw": 1.4 if axis.ordered else 0}
-        axes.plot(axis.place[order], column[order], **told, **marks)
+        marks |= {"label": label if len(labels) > 1 else None, "lw": 1.4 if axis.ordered else 0}
+        axes.plot(axis.place[order], column[order], color=color, **marks)
     more = f" (the first {_MOST_LINES} of {len(labels)})" if len(labels) > _MOST_LINES else ""
     key(axes, title + more)
     axis.show(axes)

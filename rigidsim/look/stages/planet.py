@@ -173,9 +173,7 @@ def _in_its_own_axes(dataset: xarray.Dataset, stage: Stage, figure: Array, notes
     size = float(np.nanmax(np.linalg.norm(apart, axis=1)))
     if not size > 0:
         return
-    factor = max(0.32 / size, 1.0)
-    power = 10.0 ** np.floor(np.log10(factor))
-    factor = max(np.floor(factor / power) * power, 1.0)
+    factor = max(float(f"{0.32 / size:.0e}"), 1.0)
     shown = 1.4 * figure + 1.4 * factor * apart
     times = f"{factor:,.0f} times"
     words = "spin axis" if factor == 1.0 else f"spin axis, {times} farther from the figure axis"
