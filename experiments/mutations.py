@@ -3,16 +3,14 @@
 Mistakes are drawn at random, over rooms and kinds: a sign, a product for a quotient, a comparison, an index
 off by one, a factor, min for max, a matrix untransposed, a frame. Messages, docstrings and annotations are
 spared. Tests that execute the changed line run, the cheapest first, and the first that fails catches the
-mistake. Which tests execute which line is measured once, by ``coverage`` (``pip install coverage``),
-and kept in a file. Commits are tried, in copies made by git.
+mistake. Which tests execute which line is measured once (``pip install coverage pytest-cov``), and kept in
+coverage's own file; the tests' seconds are in FILE.xml. Commits are tried, in copies made by git.
 
 Run: python -m experiments.mutations [--count N] [--seed S] [--seconds T] [--long] [--lines FILE]
 """
 
-import argparse
 import ast
 import io
-import json
 import os
 import random
 import re
@@ -20,17 +18,17 @@ import subprocess
 import sys
 import tarfile
 import tempfile
-import time
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from xml.etree import ElementTree
 
-import coverage
-import pytest
+from coverage import CoverageData
+
+from experiments.common import Command
 
 ROOT = Path(__file__).parents[1]
 OPERATORS: dict[type, type] = {
@@ -57,11 +55,6 @@ class Mutant:
     after: str
     old: str
     new: str
-
-    @property
-    def room(self) -> str:
-        """The room of the package that it is in."""
-        return self.path.split("/")[1]
 
 
 def changed(node: ast.AST) -> Iterator[tuple[str, ast.expr]]:
@@ -120,7 +113,7 @@ def mutants(tree: Path) -> dict[str, list[Mutant]]:
                 end = len(old) - len(whole[-1]) + node.end_col_offset
                 new = old[: node.col_offset] + after.encode() + old[end:]
                 made = Mutant(path, node.lineno, kind, ast.unparse(node), after, old.decode(), new.decode())
-                found[made.room].append(made)
+                found[path.split("/")[1]].append(made)
     return found
 
 
@@ -148,95 +141,46 @@ def exchanged(text: str, mutant: Mutant) -> str:
 
 
 class Executed:
-    """Which tests execute which lines, as measured by ``measure``."""
+    """Which tests execute which lines, and how long each takes, as measured by ``measure``."""
 
     def __init__(self, path: Path) -> None:
-        kept = json.loads(path.read_text())
-        self._tests, self._seconds, self._lines = kept["tests"], kept["seconds"], kept["lines"]
+        self._lines = CoverageData(str(path))
+        self._lines.read()
+        every = ElementTree.parse(f"{path}.xml").iter("testcase")
+        spent = ((f"{one.get('classname')}.{one.get('name')}", one.get("time", "0")) for one in every)
+        self._seconds = {test: float(seconds) for test, seconds in spent}
 
     def tests(self, mutant: Mutant) -> list[str]:
         """Tests that execute a line, the cheapest first; those of the whole file for a line of its import."""
-        lines = self._lines.get(mutant.path, {})
-        found = lines.get(str(mutant.line)) or {test for each in lines.values() for test in each}
-        return [self._tests[i] for i in sorted(found, key=self._seconds.__getitem__)]
+        files = self._lines.measured_files()
+        name = next((file for file in files if file.endswith(f"/{mutant.path}")), "")
+        lines = self._lines.contexts_by_lineno(name)
+        found = set(lines.get(mutant.line, [])) - {""} or set().union(*lines.values()) - {""}
+        return sorted({context.rpartition("|")[0] for context in found}, key=self._spent)
+
+    def _spent(self, test: str) -> float:
+        """Seconds; JUnit's files have dots between the parts of a test's name."""
+        place, bracket, parameters = test.partition("[")
+        dotted = place.replace(".py::", ".").replace("::", ".").replace("/", ".")
+        return self._seconds.get(dotted + bracket + parameters, 0.0)
+
+
+PYTEST = [sys.executable, "-m", "pytest", "-q"]
 
 
 def measure(tree: Path, path: Path, long: bool) -> None:
-    """Write the file of executed lines; the suite takes half as long again as alone."""
-    with tempfile.TemporaryDirectory() as folder:
-        environment = {**os.environ, "PYTHONPATH": str(tree), FOLDER: folder}
-        command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "-p", "experiments.mutations"]
-        subprocess.run(
-            [*command, *(["-m", "not campaign"] if long else [])], cwd=tree, env=environment, check=False
-        )
-        seconds: dict[str, float] = {}
-        for line in (Path(folder) / "seconds").read_text().splitlines():
-            spent, name = line.split("\t", 1)
-            seconds[name] = float(spent)
-        place, lines = {name: i for i, name in enumerate(seconds)}, dict[str, dict[int, set[int]]]()
-        for file in Path(folder).glob("lines.*"):
-            data = coverage.CoverageData(str(file))
-            data.read()
-            for source in data.measured_files():
-                kept = lines.setdefault(str(Path(source).relative_to(tree)), {})
-                for line, names in data.contexts_by_lineno(source).items():
-                    kept.setdefault(line, set()).update(place[name] for name in names if name)
-    content = {name: {line: sorted(tests) for line, tests in kept.items()} for name, kept in lines.items()}
-    path.write_text(json.dumps({"tests": list(seconds), "seconds": list(seconds.values()), "lines": content}))
-
-
-FOLDER = "RIGIDSIM_EXECUTED"
-"""Environment variable that names the folder of what the tests' processes execute."""
-_lines: Any = None
-
-
-def pytest_configure() -> None:
-    """As a plugin of pytest: note the lines that each test executes."""
-    global _lines
-    if worker := os.environ.get("PYTEST_XDIST_WORKER"):
-        name = str(Path(os.environ[FOLDER]) / f"lines.{worker}")
-        _lines = coverage.Coverage(name, source_pkgs=["rigidsim"], config_file=False)
-        _lines.start()
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
-    """Lines belong to the test that runs."""
-    if _lines is None:
-        return (yield)
-    _lines.switch_context(item.nodeid)
-    begin = time.process_time()
-    done = yield
-    with (Path(os.environ[FOLDER]) / "seconds").open("a") as out:
-        out.write(f"{time.process_time() - begin:.2f}\t{item.nodeid}\n")
-    _lines.switch_context("")
-    return done
-
-
-def pytest_sessionfinish() -> None:
-    """Keep the lines."""
-    if _lines is not None:
-        _lines.stop()
-        _lines.save()
+    """Write the files of executed lines and of seconds; the suite takes half as long again as alone."""
+    environment = {**os.environ, "PYTHONPATH": str(tree), "COVERAGE_FILE": str(path)}
+    measured = ["--cov=rigidsim", "--cov-context=test", "--cov-report=", f"--junitxml={path}.xml"]
+    command = [*PYTEST, "-n", "2", *measured, "-m", f"{'' if long else 'not slow and '}not campaign"]
+    subprocess.run(command, cwd=tree, env=environment, check=False)
 
 
 def failing(tree: Path, tests: Sequence[str], seconds: float) -> str:
     """The first test that fails; empty if none does, "time limit" if they take longer."""
     names = tree / "tests.txt"
     names.write_text("".join(f"{name}\n" for name in tests))
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-x",
-        "-q",
-        "-p",
-        "no:cacheprovider",
-        "--tb=no",
-        "-m",
-        "",
-        f"@{names}",
-    ]
+    command = [*PYTEST, "-x", "-p", "no:cacheprovider", "--tb=no", "-m", "", f"@{names}"]
     environment = {**os.environ, "PYTHONPATH": str(tree)}
     try:
         done = subprocess.run(
@@ -271,33 +215,35 @@ def unpacked(ref: str, folder: Path) -> Path:
     return folder
 
 
-def main() -> None:
-    """Try mistakes, and write a table of what caught them."""
-    parser = argparse.ArgumentParser(prog="python -m experiments.mutations")
-    parser.add_argument("--count", type=int, default=60)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--seconds", type=float, default=1200.0, help="time limit of each run of the tests")
-    parser.add_argument("--long", action="store_true", help="measure the long tests, too")
-    parser.add_argument("--ref", default="HEAD", help="the commit that is tried")
-    parser.add_argument(
-        "--lines", type=Path, help="which tests execute which lines; measured if it isn't there"
-    )
-    parser.add_argument("--out", type=Path, default=Path("mutations.tsv"))
-    given = parser.parse_args()
+@Command
+def campaign(
+    count: int = 60,
+    seed: int = 1,
+    seconds: float = 1200.0,
+    long: bool = False,
+    ref: str = "HEAD",
+    lines: str = "",
+    out: str = "mutations.tsv",
+) -> int:
+    """Try mistakes, and write a table of what caught them.
+
+    Args:
+        seconds: time limit of each run of the tests.
+        long: measure the long tests, too.
+        ref: the commit that is tried.
+        lines: which tests execute which lines; measured if it isn't there.
+    """
     with tempfile.TemporaryDirectory() as folder:
-        tree = unpacked(given.ref, Path(folder))
-        lines = given.lines or tree / "lines.json"
-        if not lines.exists():
-            measure(tree, lines, given.long)
-        executed = Executed(lines)
-        with given.out.open("w") as out:
-            for mutant in drawn(tree, given.count, given.seed):
-                found = tried(tree, mutant, executed, given.seconds)
+        tree = unpacked(ref, Path(folder))
+        kept = Path(lines or tree / "lines").absolute()
+        if not kept.exists():
+            measure(tree, kept, long)
+        executed = Executed(kept)
+        with open(out, "w") as table:
+            for mutant in drawn(tree, count, seed):
+                found = tried(tree, mutant, executed, seconds)
                 place = f"{mutant.path}:{mutant.line}"
-                row = "\t".join([place, mutant.kind, mutant.before, mutant.after, found])
-                print(row.replace("\n", " "), file=out, flush=True)
-                print(row.replace("\n", " "), flush=True)
-
-
-if __name__ == "__main__":
-    main()
+                row = "\t".join([place, mutant.kind, mutant.before, mutant.after, found]).replace("\n", " ")
+                print(row, file=table, flush=True)
+                print(row, flush=True)
+    return 0

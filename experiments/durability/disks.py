@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from experiments.durability.judging import Tally, check_after, check_complete, ended, saved_rows
-from experiments.durability.processes import await_moment, child, exit_code, work_on
-from experiments.durability.scenes import SCENES, Undisturbed, text_of
+from experiments.durability.judging import Tally, ended, saved_rows
+from experiments.durability.processes import Trial, await_moment, exit_code, in_turn
+from experiments.durability.scenes import SCENES, Undisturbed
 
 _STOPPED, _REFUSED = 3, 2  # exit codes: on the way; before anything was done
 _BUSY_SECONDS = 5.0  # that a file system may stay busy with a file being written
@@ -50,28 +50,23 @@ def _refused(folder: Path) -> None:
 def fill_disks(tally: Tally, trials: int, draw: random.Random, folder: Path, deadline: float) -> None:
     """A disk that fills up, and is enlarged before each resume."""
     wholes = Undisturbed(folder / "roomy")
-    for number in range(trials):
-        if time.monotonic() > deadline:
-            break
-        name = CHOSEN[number % len(CHOSEN)]
+    for number, name in in_turn(CHOSEN, trials, deadline):
         place = folder / f"disk{number}"
-        log = folder / f"disk{number}.log"
+        trial = Trial(tally, wholes, place / name, f"disk {number} {name}")
         full = 0
         with small_disk(place) as resize:
             size = int(wholes.size(name) * draw.uniform(0.05, 1.0)) + 65536
-            run = place / name
             for _ in range(40):
                 resize(size)
-                code = exit_code(child(work_on(run, text_of(name)), log))
+                code = exit_code(trial.begin())
                 if code == 0:
                     break
                 full += 1
-                told = log.read_text()
-                good = code in (_STOPPED, _REFUSED) and "space" in told.splitlines()[-1]
-                tally.expect(good, f"disk {number} {name}: code {code}, said {told[-300:]}")
-                check_after(tally, run, wholes[name], saved_rows(run), f"disk {number} {name}")
+                good = code in (_STOPPED, _REFUSED) and "space" in trial.told.splitlines()[-1]
+                trial.expect(good, f"code {code}")
+                trial.check(saved_rows(trial.run))
                 size = int(size * draw.uniform(1.1, 2.0)) + 65536
-            check_complete(tally, run, wholes[name], f"disk {number} {name}, complete")
+            trial.finish()
         tally.counts["full disks"] += full
         tally.tell(f"disks: {number + 1} of {trials}, {name} after {full} full ones")
 
@@ -79,50 +74,42 @@ def fill_disks(tally: Tally, trials: int, draw: random.Random, folder: Path, dea
 def lock_disks(tally: Tally, trials: int, draw: random.Random, folder: Path, deadline: float) -> None:
     """A disk that becomes read-only at a random moment, and writable before each resume; as root only."""
     wholes = Undisturbed(folder / "writable")
-    for number in range(trials):
-        if time.monotonic() > deadline:
-            break
-        name = list(SCENES)[number % len(SCENES)]
+    for number, name in in_turn(list(SCENES), trials, deadline):
         place = folder / f"locked{number}"
         place.mkdir()
         if not _mount(place, "-t", "tmpfs", "-o", "size=64m", "tmpfs"):
             print("read-only disks: left out, mounting isn't allowed here", flush=True)
             return
         try:
-            _lock_one(tally, draw, wholes, place, name, f"locked {number} {name}")
+            _lock_one(Trial(tally, wholes, place / name, f"locked {number} {name}"), draw)
         finally:
             subprocess.run(["umount", "-l", place], check=True)
         tally.tell(f"read-only disks: {number + 1} of {trials}, {name}")
 
 
-def _lock_one(
-    tally: Tally, draw: random.Random, wholes: Undisturbed, place: Path, name: str, where: str
-) -> None:
-    run, log = place / name, place.with_suffix(".log")
+def _lock_one(trial: Trial, draw: random.Random) -> None:
+    run, place = trial.run, trial.run.parent
     for _ in range(draw.randint(1, 4)):
         if ended(run):
             break
-        pid = child(work_on(run, text_of(name)), log)
+        pid = trial.begin()
         kind = draw.choice(["any", "named"])
-        await_moment(pid, run, kind, draw.uniform(0, 1.3 * wholes.seconds(name)), draw.randint(1, 12))
+        delay = draw.uniform(0, 1.3 * trial.wholes.seconds(run.name))
+        await_moment(pid, run, kind, delay, draw.randint(1, 12))
         locked = _locked(place)
         acknowledged = saved_rows(run)
         code = exit_code(pid)
         if code:
-            tally.counts["read-only disks"] += 1
-            told = log.read_text()
-            good = locked and code in (_STOPPED, _REFUSED) and "Read-only file system" in told
-            tally.expect(good, f"{where}: code {code}, said {told[-300:]}")
+            trial.tally.counts["read-only disks"] += 1
+            good = locked and code in (_STOPPED, _REFUSED) and "Read-only file system" in trial.told
+            trial.expect(good, f"code {code}")
         if run.exists():
-            check_after(tally, run, wholes[name], acknowledged, where)
-            refused = exit_code(child(work_on(run, text_of(name)), log)) if locked else _REFUSED
+            trial.check(acknowledged)
+            refused = exit_code(trial.begin()) if locked else _REFUSED
             good = refused == _REFUSED or (refused == 0 and ended(run))  # a complete run needs no writing
-            tally.expect(good, f"{where}: resumed read-only with {refused}")
+            trial.expect(good, f"resumed read-only with {refused}")
         _mount(place, "-o", "remount,rw")
-    if not ended(run):
-        code = exit_code(child(work_on(run, text_of(name)), log))
-        tally.expect(code == 0, f"{where}: {log.read_text()[-400:]}")
-    check_complete(tally, run, wholes[name], f"{where}, complete")
+    trial.finish()
 
 
 def _locked(place: Path) -> bool:

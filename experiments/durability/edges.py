@@ -4,23 +4,17 @@ import os
 import random
 import shutil
 import signal
-import time
-from collections.abc import Callable
 from pathlib import Path
 
-import rigidsim
-from experiments.durability.judging import Tally, check_after, check_complete, ended, saved_rows
-from experiments.durability.processes import child, exit_code
-from experiments.durability.scenes import DAYS, FREQUENT, MOONS, Undisturbed, text_of
+from experiments.durability.judging import Tally, ended, saved_rows
+from experiments.durability.processes import Trial, exit_code, in_turn
+from experiments.durability.scenes import DAYS, MOONS, Undisturbed
 from rigidsim.session.session import Observer, Tuning
 from rigidsim.solve.sampler import Pacing, Progress
 from rigidsim.store.segments import SegmentLimits
 
 _BLOCK = 4 * DAYS  # of the Moon; the scenes begin at an edge
-_EACH_STEP = Tuning(
-    Pacing(chunk_seconds=0.0, patience=0.0),
-    SegmentLimits(seconds=0.0),
-)
+_EACH_STEP = Tuning(Pacing(chunk_seconds=0.0, patience=0.0), SegmentLimits(seconds=0.0))
 """A look at the guards and a segment after every step or two."""
 
 
@@ -63,41 +57,25 @@ class _DiesAtEdge(Observer):
 def kill_at_edges(tally: Tally, kills: int, draw: random.Random, folder: Path, deadline: float) -> None:
     """Runs in each precision that are killed at one to four edges, and then left to finish."""
     wholes = Undisturbed(folder / "undisturbed")
-    done, number = 0, 0
-    while done < kills and time.monotonic() < deadline:
-        name = list(MOONS)[number % len(MOONS)]
+    done = 0
+    for number, name in in_turn(list(MOONS), 10**9, deadline):
+        if done >= kills:
+            break
         out = folder / f"edges{number}"
         out.mkdir()
-        before, run, note = done, out / name, out / "note"
+        trial, before, note = Trial(tally, wholes, out / name, name), done, out / "note"
         for _ in range(draw.randint(1, 4)):
-            if ended(run) or done >= kills:
+            if ended(trial.run) or done >= kills:
                 break
             observer = _DiesAtEdge(draw.randint(0, 5), draw.random() < 0.5, note)
-            code = exit_code(child(_going_on(run, observer, _EACH_STEP), out / "log"))
+            code = exit_code(trial.begin(_EACH_STEP, observer))
             if code != -signal.SIGKILL:
-                tally.expect(code == 0, f"{name}: ended with {code}: {(out / 'log').read_text()[-300:]}")
+                trial.expect(code == 0, f"ended with {code}")
                 break
             done += 1
-            check_after(tally, run, wholes[name], saved_rows(run), f"{name}, kill {done}")
-        if not ended(run):
-            code = exit_code(child(_going_on(run, _DiesAtEdge(10**9, False, note), FREQUENT), out / "log"))
-            tally.expect(code == 0, f"{name}: {(out / 'log').read_text()[-400:]}")
-        check_complete(tally, run, wholes[name], f"{name}, complete")
+            trial.check(saved_rows(trial.run))
+        trial.finish(observer=_DiesAtEdge(10**9, False, note))
         for line in note.read_text().splitlines():
             tally.counts[f"{line}, {name}"] += 1
         shutil.rmtree(out)
-        number += 1
-        tally.tell(f"kills at edges: {done} of {kills}, run {number} {name} after {done - before}")
-
-
-def _going_on(run: Path, observer: Observer, tuning: Tuning) -> Callable[[], None]:
-    begun = (run / "segments").exists()
-
-    def work() -> None:
-        if begun:
-            rigidsim.resume(run, tuning=tuning, observer=observer)
-        else:
-            experiment = rigidsim.parse(text_of(run.name))
-            rigidsim.run(experiment, out=run.parent, force=True, tuning=tuning, observer=observer)
-
-    return work
+        tally.tell(f"kills at edges: {done} of {kills}, run {number + 1} {name} after {done - before}")

@@ -5,11 +5,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import xarray
-
-import rigidsim
-from experiments.durability.scenes import same
-from rigidsim.errors import RigidsimError, RunFolderError
+from rigidsim.errors import RunFolderError
 from rigidsim.store import netcdf
 
 
@@ -66,36 +62,3 @@ def saved_rows(folder: Path) -> int:
     except RunFolderError:  # gone meanwhile: the dataset took its place
         return saved_rows(folder)
     return int(labels.get("first_sample", 0)) + int(labels["rows"])
-
-
-def check_after(tally: Tally, folder: Path, reference: xarray.Dataset, acknowledged: int, what: str) -> None:
-    """A disturbed run's folder: readable, with all that was acknowledged, and with the right bits."""
-    everything = reference.sizes["time"]
-    acknowledged = everything if acknowledged < 0 else acknowledged
-    try:
-        if not (folder / "segments").exists() and not (folder / "dataset.h5").exists():
-            tally.expect(acknowledged == 0, f"{what}: nothing there, {acknowledged} rows acknowledged")
-            return
-        run = rigidsim.open_run(folder)
-        if not run.saved:
-            tally.expect(acknowledged == 0, f"{what}: nothing saved, {acknowledged} rows acknowledged")
-            return
-        with run.dataset as found:
-            rows = found.sizes["time"]
-            tally.expect(rows >= acknowledged, f"{what}: {rows} rows, {acknowledged} acknowledged")
-            difference = same(found, reference, rows)
-            tally.expect(not difference, f"{what}: {difference} differs")
-    except RigidsimError as error:
-        tally.expect(False, f"{what}: unreadable: {error}")
-
-
-def check_complete(tally: Tally, folder: Path, reference: xarray.Dataset, what: str) -> None:
-    """A completed run is the undisturbed one."""
-    run = rigidsim.open_run(folder)
-    with run.dataset as found:
-        difference = same(found, reference)
-        steps = found.attrs["steps"] == reference.attrs["steps"]
-    tally.expect(run.status == "finished" and not difference and steps, f"{what}: {difference or run.status}")
-    left = {"config.toml", "dataset.h5", "summary.json", "checkpoint.h5"}
-    tally.expect(names(folder) == left, f"{what}: left behind {names(folder) ^ left}")
-    tally.counts["completed runs identical"] += not difference

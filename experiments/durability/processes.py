@@ -1,15 +1,17 @@
-"""Runs in processes of their own, and the moments at which something happens to them."""
+"""Runs in processes of their own, the moments at which something happens to them, and what must be left."""
 
 import os
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import rigidsim
-from experiments.durability.judging import names
-from experiments.durability.scenes import tuning_of
+from experiments.durability.judging import Tally, ended, names
+from experiments.durability.scenes import Undisturbed, same, text_of, tuning_of
 from rigidsim.errors import RigidsimError
+from rigidsim.session.session import Observer, Tuning
 
 
 def child(work: Callable[[], object], log: Path) -> int:
@@ -42,13 +44,89 @@ def exit_code(pid: int) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
 
 
-def work_on(folder: Path, text: str) -> Callable[[], object]:
+def work_on(
+    folder: Path, text: str, tuning: Tuning | None = None, observer: Observer | None = None
+) -> Callable[[], object]:
     """Begin the run of a folder, or go on with it."""
     begun = (folder / "segments").exists() or (folder / "dataset.h5").exists()
-    tuning = tuning_of(folder.name)
+    how = {"tuning": tuning or tuning_of(folder.name), "observer": observer}
     if begun:
-        return lambda: rigidsim.resume(folder, tuning=tuning)
-    return lambda: rigidsim.run(rigidsim.parse(text), out=folder.parent, force=True, tuning=tuning)
+        return lambda: rigidsim.resume(folder, **how)
+    return lambda: rigidsim.run(rigidsim.parse(text), out=folder.parent, force=True, **how)
+
+
+def in_turn(scenes: Sequence[str], trials: int, deadline: float) -> Iterator[tuple[int, str]]:
+    """Numbers, and scenes one after the other, until there are enough or no time is left."""
+    for number in range(trials):
+        if time.monotonic() > deadline:
+            return
+        yield number, scenes[number % len(scenes)]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A run that is disturbed again and again, in a folder with the name of its scene.
+
+    Attributes:
+        wholes: undisturbed runs.
+        title: for messages.
+    """
+
+    tally: Tally
+    wholes: Undisturbed
+    run: Path
+    title: str
+
+    def begin(self, tuning: Tuning | None = None, observer: Observer | None = None) -> int:
+        """Begin the run or go on with it, in a process; returns its id."""
+        log = self.run.parent.with_suffix(".log")
+        log.touch()
+        return child(work_on(self.run, text_of(self.run.name), tuning, observer), log)
+
+    @property
+    def told(self) -> str:
+        """What the processes wrote."""
+        return self.run.parent.with_suffix(".log").read_text()
+
+    def expect(self, good: bool, what: str) -> bool:
+        """Note a failure."""
+        return self.tally.expect(good, f"{self.title}: {what}; said {self.told[-300:]}")
+
+    def check(self, acknowledged: int) -> None:
+        """The folder is readable, and has all acknowledged rows (-1: all there are) in the right bits."""
+        reference = self.wholes[self.run.name]
+        acknowledged = reference.sizes["time"] if acknowledged < 0 else acknowledged
+        saved = (self.run / "segments").exists() or (self.run / "dataset.h5").exists()
+        try:
+            opened = rigidsim.open_run(self.run) if saved else None
+            if opened is None or not opened.saved:
+                self.expect(acknowledged == 0, f"nothing saved, {acknowledged} rows acknowledged")
+                return
+            with opened.dataset as found:
+                rows = found.sizes["time"]
+                self.expect(rows >= acknowledged, f"{rows} rows, {acknowledged} acknowledged")
+                difference = same(found, reference, rows)
+                self.expect(not difference, f"{difference} differs")
+        except RigidsimError as error:
+            self.expect(False, f"unreadable: {error}")
+
+    def finish(self, tuning: Tuning | None = None, observer: Observer | None = None) -> None:
+        """Let the run come to its end, which is the undisturbed one's."""
+        if ended(self.run):
+            rigidsim.resume(self.run)  # cleans up
+        else:
+            code = exit_code(self.begin(tuning, observer))
+            if not self.expect(code == 0, f"ended with {code}"):
+                return
+        run, reference = rigidsim.open_run(self.run), self.wholes[self.run.name]
+        with run.dataset as found:
+            difference = same(found, reference)
+            steps = found.attrs["steps"] == reference.attrs["steps"]
+        good = run.status == "finished" and not difference and steps
+        self.expect(good, f"complete: {difference or run.status}")
+        left = {"config.toml", "dataset.h5", "summary.json", "checkpoint.h5"}
+        self.expect(names(self.run) == left, f"left behind {names(self.run) ^ left}")
+        self.tally.counts["completed runs identical"] += not difference
 
 
 def await_moment(pid: int, folder: Path, kind: str, delay: float, nth: int) -> bool:
