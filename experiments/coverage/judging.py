@@ -88,7 +88,7 @@ class Kept(SampleReceiver):
         """Keep a block, and watch it."""
         self.trail.take(block)
         recorded = self._evaluator.evaluate(block)  # type: ignore[attr-defined]
-        exact, exponent = self._prepared.precision.exact, self._prepared.clock.exponent
+        exact, exponent = self._prepared.precision.exact, int(math.log2(self._prepared.clock.unit))
         self.times += [mpmath.ldexp(exact(t), exponent) for t in block.times]
         for invariant in self._prepared.system.invariants:
             self.statistics.see(invariant.name, recorded[f"{invariant.name}_drift"][0][:, 0])
