@@ -45,13 +45,13 @@ class SetAtKnots:
 
     def __init__(self, system: System) -> None:
         assert system.pieces is not None
-        self._pieces = system.pieces
+        self.pieces = system.pieces
         self._places = {name: place for place, name in enumerate(system.states)}
         self._entered: tuple[int, int] | None = None
 
     def enter(self, integrator: TaylorEngine) -> int:
         """Continue in the states of the piece that begins at this boundary, or contains it: its number."""
-        pieces = self._pieces
+        pieces = self.pieces
         high, low = integrator.dtime
         number = pieces.number_at(high)
         if number and high == pieces.knots[number - 1]:
@@ -64,7 +64,7 @@ class SetAtKnots:
 
     def meet(self, integrator: TaylorEngine) -> Scalar | None:
         """See ``Requirement``."""
-        pieces, number = self._pieces, self.enter(integrator)
+        pieces, number = self.pieces, self.enter(integrator)
         if self._entered != (number, id(integrator)):
             integrator.pars[:] = pieces.parameters(number)
             self._entered = (number, id(integrator))
@@ -72,10 +72,10 @@ class SetAtKnots:
 
     def end_after(self, time: Scalar) -> Scalar | None:
         """See ``Requirement``."""
-        return self._end(self._pieces.number_at(time))
+        return self._end(self.pieces.number_at(time))
 
     def _end(self, number: int) -> Scalar | None:
-        knots = self._pieces.knots
+        knots = self.pieces.knots
         return knots[number] if number < len(knots) else None
 
 

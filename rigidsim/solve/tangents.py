@@ -26,6 +26,7 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import compiled_engine
 from rigidsim.solve.precision import Precision, Scalar
+from rigidsim.solve.requirements import SetAtKnots
 from rigidsim.solve.stepper import longest_step
 from rigidsim.solve.switching.turned import Turned
 
@@ -160,7 +161,7 @@ class Tangents:
         zeros = precision.zeros((len(equations),))
         self._engine = compiled_engine(equations, zeros, **{**precision.options, **options})
         self._longest = precision.of_double(longest_step(self._engine.order, precision.scalar))
-        self._places = {name: place for place, name in enumerate(names)}
+        self._knots = None if system.pieces is None else SetAtKnots(system)
         self._clock = system.parameters - 1 if system.clocked else None
         read = [*system.turning, *system.signed]
         self._read = hy.cfunc(read, system.variables, compact_mode=True) if read else None
@@ -338,19 +339,12 @@ class Tangents:
 
     def _enter(self) -> Scalar | None:
         """Set what begins at or before this boundary, as the rows of a table; the time at which to stop."""
-        pieces, engine = self.system.pieces, self._engine
-        if pieces is None:
+        if self._knots is None:
             return None
-        high, low = engine.dtime
-        number = pieces.number_at(high)
-        if number and high == pieces.knots[number - 1]:
-            if low != 0:
-                engine.dtime = (high, high * 0)
-            for name, value in pieces.states(number).items():
-                engine.state[self._places[name]] = value
+        number = self._knots.enter(self._engine)
         if self._entered != number:
-            values, first = pieces.parameters(number), self.system.first_of_pieces
-            engine.pars[first : first + len(values)] = values
-            self.numbers[first : first + len(values)] = values
+            values, first = self._knots.pieces.parameters(number), self.system.first_of_pieces
+            for pars in (self._engine.pars, self.numbers):
+                pars[first : first + len(values)] = values
             self._entered = number
-        return pieces.knots[number] if number < len(pieces.knots) else None
+        return self._knots.end_after(self._engine.time)
