@@ -16,6 +16,7 @@ from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model.inertia import MassDistribution
 from rigidsim.model.load import Load, Term, force_terms, torque_terms
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.orbits.kepler_motion import KeplerParts
@@ -72,6 +73,8 @@ class Probe(Mechanics):
             quaternion = attitude.product(list(scene.quaternion), turned)
         turn = attitude.rotation_matrix(quaternion)
         states = AttitudeStates([], [], [], [shown(row) for row in turn], shown(quaternion), "state")
+        a, b, c, d, e, f = shown(drawn(6))  # for moments that vary, any tensor
+        shape = None if m.shape is None else MassDistribution([[a, b, c], [b, d, e], [c, e, f]], None)
         up = None if m.numbers.arm is None else m.numbers.vertical_of(states.matrix, number)
         place = speed = None
         if scene.position is not None and scene.velocity is not None:
@@ -83,7 +86,7 @@ class Probe(Mechanics):
             scene, scaling, m.numbers, shown([w / u for w, u in zip(rates, units, strict=True)]), states, up,
             None if place is None else shown([context.ldexp(x, -scaling.length) for x in place]),
             None if speed is None else shown([context.ldexp(x, -scaling.speed) for x in speed]),
-            number, loads=m.loads, turn=turn, place=place, draw=draw,
+            number, loads=m.loads, shape=shape, turn=turn, place=place, draw=draw,
             moment=scene.start + (scene.end - scene.start) * context.mpf(draw.random()),
         )  # fmt: skip
 
@@ -134,7 +137,7 @@ class Probe(Mechanics):
 
 def _reads_more(load: Load) -> bool:
     """Whether a load depends on more than a state of numbers has, or says that it is narrow."""
-    moves = load.table or load.sights or load.of_time or load.reacts or load.changes
+    moves = load.table or load.sights or load.of_time or load.reacts
     return bool(moves) or type(load).narrow is not Load.narrow
 
 
@@ -161,9 +164,8 @@ def samples(m: Mechanics, about: Vector | None = None) -> list[list[Acting | Non
     """What each load exerts at random states (see ``Probe.acting``); None where that isn't known."""
     key = "samples", None if about is None else tuple(about)
     if key not in m.made:
-        probes = [] if m.shape is not None else Probe.several(m)
-        m.made[key] = [[probe.acting(load, about) for load in m.loads] for probe in probes]
-    return m.made[key] or [[None] * len(m.loads)]
+        m.made[key] = [[probe.acting(load, about) for load in m.loads] for probe in Probe.several(m)]
+    return m.made[key]
 
 
 def spared(m: Mechanics, found: Sequence[Sequence[Acting | None]], axis: Vector) -> bool:
