@@ -102,11 +102,6 @@ class EventLog:
         del self.found[count:]
         self._find_stop()
 
-    def drop_after(self, count: int, limit: Scalar) -> None:
-        """Forget crossings after a time, but none of the first ``count``."""
-        self.found[count:] = [f for f in self.found[count:] if f.time <= limit]
-        self._find_stop()
-
     def _find_stop(self) -> None:
         ending = self.ending
         self.stop = None if ending is None else ending.time

@@ -364,7 +364,7 @@ class SwitchingStepper(TaylorStepper):
         if self._unsettled or self._functions.unturned or self.watcher is not None or self._along:
             return True
         knot = self._moments.following(self._integrator.dtime)
-        return knot is not None and knot[0] <= self.time
+        return knot is not None and bool(knot[0] <= self.time)
 
     def _together(self, most: int, samples: SamplesWithin | None) -> bool:
         """Take several plain steps; returns whether the one that follows has to be taken by itself."""
@@ -487,8 +487,8 @@ class SwitchingStepper(TaylorStepper):
             bad[rows], near[rows] = (others & wrong).any(axis=0), (others & close).any(axis=0)
         rows = np.flatnonzero(crossed >= 0)
         if len(rows):
-            here = states[1:][rows], times[rows], pars[rows]
-            bad[rows] |= near[rows] | ~self._crossing(states[:-1][rows], *here, crossed[rows])
+            there = states[:-1][rows], states[1:][rows], times[rows], pars[rows]
+            bad[rows] |= near[rows] | ~self._crossing(*there, crossed[rows])
         series = [(row, one.series) for row, one in enumerate(passed) if one.series is not None]
         maybe = may_be_sparse(np.array([found for _, found in series])) if series else np.zeros(0)
         for k in np.flatnonzero(maybe):
@@ -563,9 +563,9 @@ class SwitchingStepper(TaylorStepper):
             if not finite:
                 return False
             size = engine.last_h
-            arrived = self._cut is None and knot is not None and size >= left
-            if arrived:
-                engine.dtime = knot
+            reached = knot if self._cut is None and size >= left else None
+            if reached is not None:
+                engine.dtime = reached
             missed, mistaken = self._missed(before), self._mistaken(before)
             if missed is None and mistaken is None:
                 break
@@ -574,12 +574,12 @@ class SwitchingStepper(TaylorStepper):
                 muted.add(mistaken)
             elif attempt < self.precision.bits:  # the engine finds its zero in a shorter step
                 longest = size / 2
-            elif not self._arrive(missed, -self._modes[missed], before):  # it leaves its side at once
-                return False
+            elif missed is not None and not self._arrive(missed, -self._modes[missed], before):
+                return False  # it left its side at once
         else:
             return self._fail(missed or 0, "it turns back to it again and again")
         cut = self._cut
-        if (cut is not None or arrived) and self.has_events:
+        if (cut is not None or reached is not None) and self.has_events:
             self._note_events(before, time[0], events)
         self._dense = engine
         self.smallest = self.largest = abs(float(size))
@@ -590,7 +590,7 @@ class SwitchingStepper(TaylorStepper):
         self._crossed = 0
         if cut is not None and not self._arrive(*cut, before):
             return False
-        if arrived and not self._pass_knot(knot, before):
+        if reached is not None and not self._pass_knot(reached, before):
             return False
         if self._along:
             self._keep_to_surfaces()
