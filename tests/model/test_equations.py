@@ -220,7 +220,7 @@ NEEDS = {
         SPACE,
         ["angular_velocity"],
         "auto",
-        [RATES, QUATERNION, "work"],
+        [RATES, QUATERNION],
     ),
     "everything": (FREE, SPIN, "", [], "auto", [RATES, QUATERNION]),
     "heavy top's energies": (
