@@ -19,8 +19,9 @@ apart: the shares that are seen past each are multiplied.
 from __future__ import annotations
 
 import random
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import heyoka as hy
@@ -104,7 +105,7 @@ class Shadows(NameProvider):
             size = pair.source.radius(context) / far[0] if pair.source.extended else None
             _refuse_inside(pair.other, far[1], context)
             before = far[1] < far[0]
-            values = _ShareInNumbers(context).parts(units, size, pair.other.radius(context) / far[1], before)
+            values = _in_numbers(context).parts(units, size, pair.other.radius(context) / far[1], before)
             found |= {name: values[part] for part, name in pair.parts.items()}
         return found
 
@@ -128,7 +129,7 @@ class Shadows(NameProvider):
                 for x, place in ((pair.source, here), (pair.other, there))
             )
             before = hy.gt(_number(m, here.unit / there.unit) * there.inverse, here.inverse)
-            values = _ShareInExpressions(m).parts([here.direction, there.direction], size, other, before)
+            values = _in_expressions(m).parts([here.direction, there.direction], size, other, before)
             found |= {name: values[part] for part, name in pair.parts.items()}
         return found
 
@@ -149,30 +150,20 @@ def _pairs(config: Config) -> Iterator[_Pair]:
         yield from (_Pair(source, other) for other in others if source.name)
 
 
+@dataclass(frozen=True)
 class _Share:
-    """The share in arithmetic that is either mpf's or heyoka's."""
+    """The share in arithmetic that is either mpf's or heyoka's.
 
-    sin: Any
-    asin: Any
-    sqrt: Any
-    atan2: Any
+    Attributes:
+        choose: the second or the third of its arguments, by the first.
+        above: whether all values are above zero.
+    """
 
-    def __init__(self, context: Any) -> None:
-        self._context = context
-        self._edge = context.ldexp(context.one, -(bits_in_use(context) // 2))
-
-    def number(self, value: Any) -> Any:
-        raise NotImplementedError
-
-    def square(self, value: Any) -> Any:
-        return value * value
-
-    def choose(self, of: Any, if_so: Any, otherwise: Any) -> Any:
-        raise NotImplementedError
-
-    def above(self, values: list[Any]) -> Any:
-        """Whether all are above zero."""
-        raise NotImplementedError
+    context: Any
+    functions: Any  # sin, asin, sqrt, atan2
+    number: Callable[[Any], Any]
+    choose: Callable[[Any, Any, Any], Any]
+    above: Callable[[list[Any]], Any]
 
     def parts(self, units: list[Any], first: Any, second: Any, before: Any) -> dict[str, Any]:
         """The parts of ``_Pair.parts``.
@@ -183,22 +174,23 @@ class _Share:
             second: that of the other one's.
             before: whether the other one is nearer.
         """
-        one = self.number(self._context.one)
-        apart = self.square(units[0][0] - units[1][0])
+        one = self.number(self.context.one)
+        apart = _square(units[0][0] - units[1][0])
         for x, y in zip(units[0][1:], units[1][1:], strict=True):
-            apart = apart + self.square(x - y)
+            apart = apart + _square(x - y)
         apart = apart / 4.0
-        b = self.asin(second)
+        b = self.functions.asin(second)
         if first is None:
-            least = self.square(self.sin(b / 2.0))
+            least = _square(self.functions.sin(b / 2.0))
             return {"outer": least - apart, "full": self.choose(before, 0.0 * one, one)}
-        a = self.asin(first)
-        inside, outside = (self.square(self.sin(x / 2.0)) for x in (a - b, a + b))
-        edge = self.number(self._edge) * (first * second)
+        a = self.functions.asin(first)
+        inside, outside = (_square(self.functions.sin(x / 2.0)) for x in (a - b, a + b))
+        edge = self.context.ldexp(self.context.one, -(bits_in_use(self.context) // 2))
+        edge = self.number(edge) * (first * second)
         inner, outer = apart - inside, outside - apart
         partial = self.above([inner - edge / 2.0, outer - edge / 2.0])
         covered = self._covered(a, b, self.choose(partial, apart, (inside + outside) / 2.0))
-        ring = self.choose(self.above([a - b]), one - self.square(b / a), 0.0 * one)
+        ring = self.choose(self.above([a - b]), one - _square(b / a), 0.0 * one)
         return {
             "inner": inner - edge,
             "outer": outer - edge,
@@ -208,44 +200,33 @@ class _Share:
 
     def _covered(self, a: Any, b: Any, apart: Any) -> Any:
         """Share of a disc of angular radius a under one of b, for sin^2 of half the angle between them."""
-        c = 2.0 * self.asin(self.sqrt(apart))
+        c = 2.0 * self.functions.asin(self.functions.sqrt(apart))
         x = (c * c + (a - b) * (a + b)) / (2.0 * c)
         product = (a + b - c) * (a + b + c) * (c - a + b) * (c + a - b)
-        y = self.sqrt(self.choose(self.above([product]), product, 0.0 * c + 1.0)) / (2.0 * c)
-        area = a * a * self.atan2(y, x) + b * b * self.atan2(y, c - x) - c * y
-        return area * self.number(1 / self._context.pi) / (a * a)
+        y = self.functions.sqrt(self.choose(self.above([product]), product, 0.0 * c + 1.0)) / (2.0 * c)
+        area = a * a * self.functions.atan2(y, x) + b * b * self.functions.atan2(y, c - x) - c * y
+        return area * self.number(1 / self.context.pi) / (a * a)
 
 
-class _ShareInNumbers(_Share):
-    def __init__(self, context: Any) -> None:
-        super().__init__(context)
-        self.sin, self.asin, self.sqrt, self.atan2 = context.sin, context.asin, context.sqrt, context.atan2
-
-    def number(self, value: Any) -> Any:
-        return value
-
-    def choose(self, of: Any, if_so: Any, otherwise: Any) -> Any:
-        return if_so if of else otherwise
-
-    def above(self, values: list[Any]) -> Any:
-        return all(x > 0 for x in values)
+def _in_numbers(context: Any) -> _Share:
+    return _Share(
+        context,
+        context,
+        lambda x: x,
+        lambda of, x, y: x if of else y,
+        lambda values: all(x > 0 for x in values),
+    )
 
 
-class _ShareInExpressions(_Share):
-    sin, asin, sqrt, atan2 = map(staticmethod, (hy.sin, hy.asin, hy.sqrt, hy.atan2))
-
-    def __init__(self, m: Kinematics) -> None:
-        super().__init__(m.scene.context)
-        self._m = m
-
-    def number(self, value: Any) -> Any:
-        return _number(self._m, value)
-
-    def choose(self, of: Any, if_so: Any, otherwise: Any) -> Any:
-        return hy.select(of, if_so, otherwise)
-
-    def above(self, values: list[Any]) -> Any:
+def _in_expressions(m: Kinematics) -> _Share:
+    def above(values: list[Any]) -> Any:
         return hy.logical_and([hy.gt(x, 0.0) for x in values])
+
+    return _Share(m.scene.context, hy, partial(_number, m), hy.select, above)
+
+
+def _square(value: Any) -> Any:
+    return value * value
 
 
 def _number(m: Kinematics, value: Any) -> Any:
