@@ -4,8 +4,8 @@ Kepler orbits whose node turns about the ecliptic's pole (the Moon) or the Lapla
 in step 1:1 and 3:2. The state is the mean place of the pole in the frame of the node (Hann window), from
 which the next run starts, and the full model at last.
 
-The balance L |W| sin I = dU/dt (Colombo 1966; Peale 1969, Astronomical Journal 74, 483) is solved by
-bisection; the linear theory of the path about it has the Jacobian J of the torque summed over the anomaly,
+The balance L |W| sin I = dU/dt (Colombo 1966; Peale 1969, Astronomical Journal 74, 483) is solved
+numerically; the linear theory of the path about it has the Jacobian J of the torque summed over the anomaly,
 and moves the pole by (i k w - J)^-1 of each harmonic. Tolerances: a tenth of what goes round, for the Moon
 also the bend of the figure axis, (3 e)^2 (C - A)/C n/w of the angle; three times 3/2 (C - A)/C n/w for what
 averaging leaves out.
@@ -17,8 +17,9 @@ import sys
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import brentq
 
-from experiments.common import Answer, Check, Curve, Panel, Picture, Result, Study, covered, simulate
+from experiments.common import EPSILON, Answer, Check, Curve, Panel, Picture, Result, Study, covered, simulate
 from rigidsim.scene.arithmetic import context_for, hansen
 from rigidsim.scene.bodies.presets import PRESETS
 
@@ -115,10 +116,7 @@ class Case:
     def theory(self) -> float:
         """Angle of the pole from that of the node's plane, rad."""
         low, high = (1e-6, 0.1) if self.state == 2 else (np.radians(self.inclination), 0.3)
-        for _ in range(60):
-            middle = (low + high) / 2
-            low, high = (middle, high) if self.balance(middle) * self.balance(high) < 0 else (low, middle)
-        return (low + high) / 2
+        return float(brentq(self.balance, low, high, xtol=1e-16, rtol=4 * EPSILON["double"]))
 
     def torque(self, pole: np.ndarray, argument: np.ndarray) -> np.ndarray:
         """(arguments of the pericentre, 2): mean torque over L at a pole (X, Y), node's frame, rad/s."""
@@ -261,14 +259,8 @@ def find(case: Case) -> Found:
     linear, forced = case.linear(average.values("time"), paths[-1][0])
     last = case.run(pole, "orbit_averaged", case.years[1], 1001, estimate=True)
     full = case.run(pole, "full", case.years[1], 1001)
-    return Found(
-        angle(paths[-1]),
-        angle(linear),
-        (paths[0], paths[-1], linear),
-        float(np.linalg.norm(forced, axis=1).max()),
-        last.apart(full),
-        last.announced(),
-    )
+    round_it, shown = float(np.linalg.norm(forced, axis=1).max()), (paths[0], paths[-1], linear)
+    return Found(angle(paths[-1]), angle(linear), shown, round_it, last.apart(full), last.announced())
 
 
 def picture(shown: list[tuple[Case, Found]]) -> Picture:
@@ -279,9 +271,8 @@ def picture(shown: list[tuple[Case, Found]]) -> Picture:
         drawn = list(zip(found.paths, ("grey", "blue", "orange"), labels, strict=True))
         curves = [Curve(*np.degrees(path - mean(found.paths[1])).T * 3600, label, color, width=0.8)
                   for path, color, label in (drawn if case.name == "mercury" else drawn[:2])]  # fmt: skip
-        title = (
-            f"{case.name.title()}, state {case.state}: {np.degrees(found.angle):.4f} deg from the node's pole"
-        )
+        degrees = np.degrees(found.angle)
+        title = f"{case.name.title()}, state {case.state}: {degrees:.4f} deg from the node's pole"
         panels.append(Panel(title, "along the node (arcsec)", "across (arcsec)",
                             [*curves, Curve(0, 0, "", "grey", "+", 3)], equal=True))  # fmt: skip
     title = "Cassini's states: the pole in the frame that turns with the orbit's node"

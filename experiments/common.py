@@ -98,7 +98,7 @@ def table(checks: Sequence[Check], title: str = "") -> str:
             "| --- | --- | --- | --- | --- | --- | --- |",
             *(check.row for check in checks),
             "",
-            f"{verdict}",
+            verdict,
         ]
     )
 
@@ -137,15 +137,10 @@ class Result:
         """A variable as a float64 array."""
         return self.dataset[name].values
 
-    def exact(self, name: str) -> list[Any]:
-        """A scalar variable, or the time, as mpf with every digit of the run's precision."""
-        return exact(*(self.dataset[part].values for part in parts_in(self.dataset, name)))
-
-    def exact_component(self, name: str, component: str) -> list[Any]:
-        """One component of a vector, as mpf with every digit of the run's precision."""
-        dimension = self.dataset[name].dims[1]
-        parts = (self.dataset[part] for part in parts_in(self.dataset, name))
-        return exact(*(part.sel({dimension: component}).values for part in parts))
+    def exact(self, name: str, component: str = "") -> list[Any]:
+        """A scalar variable, the time or a component, as mpf with every digit of the run's precision."""
+        chosen = {self.dataset[name].dims[1]: component} if component else {}
+        return exact(*(self.dataset[part].sel(chosen).values for part in parts_in(self.dataset, name)))
 
 
 def exact(*parts: Any) -> list[Any]:
@@ -164,10 +159,8 @@ def simulate(config: str | Path, *overrides: str) -> Result:
         RuntimeError: the run didn't finish.
     """
     settings = ["output.timeline=false", *overrides]
-    if isinstance(config, Path):
-        experiment = rigidsim.load(config, overrides=settings)
-    else:
-        experiment = rigidsim.parse(config, overrides=settings)
+    read: Callable[..., rigidsim.Experiment] = rigidsim.load if isinstance(config, Path) else rigidsim.parse
+    experiment = read(config, overrides=settings)
     with tempfile.TemporaryDirectory() as folder:
         run = rigidsim.run(experiment, out=folder)
         if run.status != "finished":
@@ -179,10 +172,8 @@ def simulate(config: str | Path, *overrides: str) -> Result:
 def covered(title: str, distance: np.ndarray, announced: float) -> Check:
     """An average's largest distance from the full motion over what it announces."""
     print(f"{title}: {distance.max():.2g} from the full motion, {announced:.2g} announced", file=sys.stderr)
-    name, source = (
-        f"{title} from the full motion's, over what is announced",
-        "summary.json, modelling: at most 1",
-    )
+    name = f"{title} from the full motion's, over what is announced"
+    source = "summary.json, modelling: at most 1"
     return Check(name, float(distance.max()) / announced, 0.5, 0.5, "1", source, "absolute")
 
 

@@ -345,10 +345,8 @@ def campaign(files: int = 24, models: int = 16, seed: int = 1, no_rates: bool = 
         seen: Counter[str] = Counter()
         shares: list[float] = []
         for number in range(count):
-            chance, convention = (
-                random.Random(f"{seed} {what} {number}"),
-                CONVENTIONS[number % len(CONVENTIONS)],
-            )
+            chance = random.Random(f"{seed} {what} {number}")
+            convention = CONVENTIONS[number % len(CONVENTIONS)]
             found, wrong = judge(chance, convention, not no_rates)
             seen[found.verdict] += 1
             local = found.local_defects

@@ -59,9 +59,9 @@ class Scene:
         end: s.
     """
 
-    moments: tuple[float, ...]
-    rates: tuple[float, ...]
-    damping: tuple[float, ...]
+    moments: list[float]
+    rates: list[float]
+    damping: list[float]
     end: float
     gradient: str = ""
 
@@ -70,29 +70,20 @@ class Scene:
         reduced = level != "full"
         energy = ["energy"] if reduced else ["rotational_energy", "figure_axis"]
         record = ["momentum_axis", "angular_momentum_norm", *energy]
-        return simulate(
-            CONFIG.format(
-                moments=[float(x) for x in self.moments], rates=[float(x) for x in self.rates],
-                damping=[float(x) for x in self.damping], gradient=self.gradient, end=self.end,
-                samples=samples, level=level, record=record, estimate=str(reduced and estimate).lower(),
-            ).replace("'", '"')
-        )  # fmt: skip
+        told = {"level": level, "record": record, "estimate": str(reduced and estimate).lower()}
+        return simulate(CONFIG.format(**vars(self), **told, samples=samples).replace("'", '"'))
 
 
 def tumbler(size: float, end: float, gradient: str = "") -> Scene:
     """Moments 1 : 1.7 : 2, in short-axis mode, with a wobble of 30 deg."""
-    return Scene((1.0, 1.7, 2.0), (0.4, 0.5, 1.2), (size, 2 * size, 1.5 * size), end, gradient)
+    return Scene([1.0, 1.7, 2.0], [0.4, 0.5, 1.2], [size, 2 * size, 1.5 * size], end, gradient)
 
 
 def distances(averaged: Result, full: Result) -> dict[str, np.ndarray]:
     """Of the averaged motion from the full one at the samples: rad, and relative."""
-    return {
-        "momentum_axis": averaged.apart(full),
-        "angular_momentum_norm": np.abs(
-            averaged.values("angular_momentum_norm") / full.values("angular_momentum_norm") - 1
-        ),
-        "energy": np.abs(averaged.values("energy") / full.values("rotational_energy") - 1),
-    }
+    sizes = {"angular_momentum_norm": "angular_momentum_norm", "energy": "rotational_energy"}
+    found = {name: np.abs(averaged.values(name) / full.values(there) - 1) for name, there in sizes.items()}
+    return {"momentum_axis": averaged.apart(full), **found}
 
 
 def wobble_checks(scene: Scene, averaged: Result, full: Result) -> list[Check]:
@@ -107,7 +98,7 @@ def wobble_checks(scene: Scene, averaged: Result, full: Result) -> list[Check]:
 
 def axisymmetric() -> Check:
     """Energy of a body whose rates decay exponentially."""
-    scene = Scene((1.0, 1.0, 2.0), (0.4, 0.5, 1.2), (1e-4, 1e-4, 1.5e-4), 1e5)
+    scene = Scene([1.0, 1.0, 2.0], [0.4, 0.5, 1.2], [1e-4, 1e-4, 1.5e-4], 1e5)
     found = scene.run("spin_averaged", estimate=False)
     moments, damping = np.array(scene.moments), np.array(scene.damping)
     rates = np.array(scene.rates)[:, None] * np.exp(-(damping / moments)[:, None] * found.values("time"))
@@ -140,7 +131,7 @@ def orders(sizes: np.ndarray) -> tuple[list[Check], dict[str, np.ndarray]]:
 def random_scene(number: int) -> Scene:
     """A triaxial body in any rotation, any viscous torque, in 0.4 of them with a gravity gradient."""
     random = np.random.default_rng([15, number])
-    a, b = random.uniform(0.3, 1.0, 2)
+    a, b = random.uniform(0.3, 1.0, 2).tolist()
     third = random.uniform(max(abs(a - b), 0.3) * 1.01, a + b)
     direction = random.normal(size=3)
     torque = 10.0 ** random.uniform(-5, -2.5)
@@ -148,13 +139,9 @@ def random_scene(number: int) -> Scene:
     if random.uniform() < 0.4:
         motion = 10.0 ** random.uniform(-3, -2)
         gradient = GRADIENT.format(square=motion**2, e=random.uniform(0, 0.3), tilt=random.uniform(0, 60))
-    return Scene(
-        (a, b, third),
-        tuple(direction / np.linalg.norm(direction)),
-        tuple(torque * random.uniform(0, 1, 3)),
-        float(min(random.uniform(0.3, 1.5) / torque, 4e4)),
-        gradient,
-    )
+    rates, damping = direction / np.linalg.norm(direction), torque * random.uniform(0, 1, 3)
+    end = min(random.uniform(0.3, 1.5) / torque, 4e4)
+    return Scene([a, b, third], rates.tolist(), damping.tolist(), end, gradient)
 
 
 def campaign(count: int) -> tuple[list[Check], np.ndarray, int]:

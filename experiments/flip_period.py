@@ -56,7 +56,7 @@ def run(exponent: int, precision: str) -> tuple[Result, list[Any]]:
     samples = int(end * top.p * PER_UNIT) + 1
     text = CONFIG.format(exponent=exponent, end=mpmath.nstr(end, 8), samples=samples, precision=precision)
     result = simulate(text)
-    reversals = crossings(result.exact("time"), result.exact_component("angular_velocity", "y"), points=24)
+    reversals = crossings(result.exact("time"), result.exact("angular_velocity", "y"), points=24)
     return result, reversals
 
 

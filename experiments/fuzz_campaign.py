@@ -28,8 +28,18 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from rich.console import Console
+
+import rigidsim
 from experiments.common import Command
+from rigidsim.cli.screens import summary as report
 from rigidsim.errors import ConfigError, RigidsimError
+from rigidsim.scene.config import load
+from rigidsim.scene.scene import build_scene
+from rigidsim.solve.problem import prepare
+from rigidsim.store.provenance import file_sha256
+from rigidsim.store.run import open_run
+from rigidsim.workflows.plan import plan
 
 LONGEST_MESSAGE = 20_000
 PREPARED_EVERY, PLANNED_EVERY = 20, 1000
@@ -252,11 +262,6 @@ class TooSlow(BaseException):
 
 def config_case(number: int, seed: int, folder: Path) -> str:
     """Load one hostile config and build its scene; some are prepared and planned as well."""
-    from rigidsim.scene.config import load
-    from rigidsim.scene.scene import build_scene
-    from rigidsim.solve.problem import prepare
-    from rigidsim.workflows.plan import plan
-
     path = folder / "case.toml"
     path.write_bytes(hostile_config(random.Random(f"{seed} config {number}")))
     try:
@@ -287,8 +292,6 @@ def _judged(error: RigidsimError) -> str:
 
 def base_runs(folder: Path) -> list[Path]:
     """Run folders to damage: finished and unfinished, in double and beyond."""
-    import rigidsim
-
     made = []
     for precision in ('"double"', '"quadruple"'):
         for steps in (100_000, 20):
@@ -300,12 +303,6 @@ def base_runs(folder: Path) -> list[Path]:
 
 def file_case(number: int, seed: int, folder: Path, bases: list[Path]) -> str:
     """Damage one file of a copied run folder and read everything in it."""
-    from rich.console import Console
-
-    from rigidsim.cli.screens import summary as report
-    from rigidsim.scene.config import load
-    from rigidsim.store.run import open_run
-
     rng = random.Random(f"{seed} file {number}")
     target = folder / "run"
     shutil.rmtree(target, ignore_errors=True)
@@ -349,8 +346,6 @@ def _spoiled(path: Path, rng: random.Random, bases: list[Path]) -> bytes:
 
 
 def _resealed(target: Path) -> None:
-    from rigidsim.store.provenance import file_sha256
-
     with contextlib.suppress(OSError, ValueError, TypeError, RecursionError):
         summary = json.loads((target / "summary.json").read_text())
         if "dataset_sha256" in summary:

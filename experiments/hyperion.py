@@ -18,9 +18,10 @@ from typing import Any
 
 import heyoka as hy
 import numpy as np
+from scipy.optimize import brentq
 
 import rigidsim
-from experiments.common import Answer, Check, Curve, Panel, Picture, Study, simulate
+from experiments.common import EPSILON, Answer, Check, Curve, Panel, Picture, Study, simulate
 from experiments.measure import matrices
 from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.solve.problem import prepare
@@ -83,13 +84,9 @@ class Motion:
         """At pericentre: the long axis at ``theta`` from it, spinning at ``spin`` (n), tilted about it."""
         state = self.start.copy()
         state[:3] = 0, 0, spin / self.rate
-        a, b = theta / 2, tilt / 2  # R3(theta) R1(tilt)
-        state[3:7] = (
-            np.cos(a) * np.cos(b),
-            np.cos(a) * np.sin(b),
-            np.sin(a) * np.sin(b),
-            np.sin(a) * np.cos(b),
-        )
+        halves = np.array([theta, tilt]) / 2  # R3(theta) R1(tilt)
+        (a, b), (c, d) = np.cos(halves), np.sin(halves)
+        state[3:7] = a * b, a * d, c * d, c * b
         return state
 
     def samples(self, state: np.ndarray, revolutions: float, count: int) -> np.ndarray:
@@ -139,17 +136,9 @@ def shoot(motion: Motion, theta: float, k: int, m: int) -> list[float]:
     values = [miss(spin) for spin in grid]
     roots = []
     for i in range(40):
-        a, b, fa, fb = grid[i], grid[i + 1], values[i], values[i + 1]
-        if fa * fb >= 0 or abs(fa - fb) > 2:
-            continue
-        for _ in range(60):  # Illinois
-            c = b - fb * (b - a) / (fb - fa)
-            fc = miss(c)
-            a, fa = (b, fb) if fc * fb < 0 else (a, fa / 2)
-            b, fb = c, fc
-            if abs(fc) < 1e-14 or a == b:
-                break
-        roots.append(float(b))
+        fa, fb = values[i : i + 2]
+        if fa * fb < 0 and abs(fa - fb) <= 2:
+            roots.append(float(brentq(miss, grid[i], grid[i + 1], xtol=1e-16, rtol=4 * EPSILON["double"])))
     return roots
 
 
@@ -228,11 +217,8 @@ def picture(motion: Motion, shown: dict[str, Resonance], exponents: dict[str, Ex
             axes.annotate(name, place, (7, 4), textcoords="offset points", color=color, fontweight="bold")
 
     def pointing(axes: Any) -> None:
-        longitude, latitude = (
-            np.degrees(np.arctan2(spin[:, 1], spin[:, 0])),
-            np.degrees(np.arcsin(spin[:, 2])),
-        )
-        points = axes.scatter(longitude, latitude, c=time, s=2.5, cmap="viridis")
+        sky = np.degrees([np.arctan2(spin[:, 1], spin[:, 0]), np.arcsin(spin[:, 2])])
+        points = axes.scatter(*sky, c=time, s=2.5, cmap="viridis")
         axes.figure.colorbar(points, ax=axes, label="time (revolutions)")
 
     sections = [section(np.pi / 2, 1.0, 3000, "grey", 0.22)]

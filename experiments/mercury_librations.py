@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Study, simulate
+from experiments.measure import matrices
 
 ARCSEC = math.radians(1 / 3600)
 YEAR = 365.25
@@ -43,11 +44,8 @@ def anomaly(days: np.ndarray) -> np.ndarray:
 
 def angle(quaternion: np.ndarray) -> np.ndarray:
     """Angle of the x axis about the mean z axis, rad, continuous, from where that plane cuts the XY plane."""
-    w, x, y, z = quaternion.T
-    first = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], axis=1)
-    pole = np.mean(
-        np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1), axis=0
-    )
+    axes = matrices(quaternion)
+    first, pole = axes[:, :, 0], axes[:, :, 2].mean(axis=0)
     pole /= np.linalg.norm(pole)
     node = np.array([-pole[1], pole[0], 0.0]) / math.hypot(pole[0], pole[1])
     return np.unwrap(np.arctan2(first @ np.cross(pole, node), first @ node))

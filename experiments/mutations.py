@@ -106,8 +106,6 @@ def mutants(tree: Path) -> dict[str, list[Mutant]]:
         lines = text.encode().splitlines(keepends=True)
         for node in reachable(ast.parse(text)):
             for kind, other in changed(node):
-                assert node.end_lineno is not None
-                assert node.end_col_offset is not None
                 whole = lines[node.lineno - 1 : node.end_lineno]
                 old, after = b"".join(whole), f"({ast.unparse(other)})"
                 end = len(old) - len(whole[-1]) + node.end_col_offset

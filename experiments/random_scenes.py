@@ -123,6 +123,13 @@ class Draw:
         down = [0.0, 0.0, -strength * self.length / self.time**2]
         self.load("uniform_gravity", f"acceleration = {down}")
 
+    def text(self, name: str, time: Sequence[str], integrator: Sequence[str], *output: str) -> str:
+        """The config: all that was drawn, and lines of further tables."""
+        tables = {"parameters": self.parameters, "body": [*self.lines, *self.more], "time": time}
+        tables |= {"integrator": integrator, "output": [*output, "timeline = false"]}
+        lines = [line for key, rest in tables.items() if rest for line in (f"[{key}]", *rest)]
+        return "\n".join([f'name = "{name}"', *lines, ""])
+
     def sometimes(self, chance: float) -> bool:
         """True with this chance."""
         return bool(self.random.random() < chance)
@@ -301,21 +308,11 @@ def random_scene(number: int, seed: int = 0) -> RandomScene:
     if kind == "late pulse":
         draw.parameters.append(f"late = {end * draw.between(0.5, 0.95)!r}")
     samples = round(draw.decades(math.log10(2), math.log10(2000)))
-    parameters = ["[parameters]", *draw.parameters] if draw.parameters else []
-    fixed = []
+    fixed = [f"accuracy = {accuracy!r}"]
     if draw.sometimes(0.35):  # where there is a closed form it would nearly always be chosen
         fixed.append('method = "taylor"')
     if accuracy > _LOOSE and draw.sometimes(0.15):
         fixed.append('precision = "single"')
-    lines = [
-        f'name = "scene{number}"',
-        *parameters,
-        "[body]",
-        *draw.lines,
-        *draw.more,
-        f"[time]\nend = {end!r}\nsamples = {samples}",
-        f"[integrator]\naccuracy = {accuracy!r}",
-        *fixed,
-        '[output]\nrecord = ["quaternion"]\ntimeline = false',
-    ]
-    return RandomScene(number, kind, "\n".join(lines) + "\n", accuracy, radians)
+    time = [f"end = {end!r}", f"samples = {samples}"]
+    text = draw.text(f"scene{number}", time, fixed, 'record = ["quaternion"]')
+    return RandomScene(number, kind, text, accuracy, radians)

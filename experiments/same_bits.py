@@ -86,15 +86,9 @@ class Version:
 
     def __init__(self, checkout: Path) -> None:
         environment = {**os.environ, "PYTHONPATH": str(checkout)}
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", _WORKER],
-            cwd=checkout,
-            env=environment,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+        command = [sys.executable, "-c", _WORKER]
+        self._process = subprocess.Popen(command, cwd=checkout, env=environment, text=True, **pipes)
 
     def run(self, scene: Scene, out: Path | None, *, most: int | None = None, resumed: bool = False) -> Any:
         """The answer of the process.
@@ -107,14 +101,7 @@ class Version:
         overrides = ["output.timeline=false", "output.estimate=false"]
         if most is not None:
             overrides.append(f"limits.max_steps={most}")
-        job = {
-            **scene.job,
-            "overrides": overrides,
-            "resumed": resumed,
-            "out": None if out is None else str(out),
-        }
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
+        job = scene.job | {"overrides": overrides, "resumed": resumed, "out": out and str(out)}
         self._process.stdin.write(json.dumps(job) + "\n")
         self._process.stdin.flush()
         for line in self._process.stdout:

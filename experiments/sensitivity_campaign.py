@@ -3,7 +3,8 @@
 Each case draws a scene and one number of its config. A run in double precision
 records the derivatives. Four runs with this number moved, in quadruple precision, give the central difference
 of fourth order: steps h of 1e-6 leave some h^4 = 1e-24, and 1e-13 for the 80 bits in which they are
-subtracted. They share nothing with the variational equations but the way from a config to equations. The
+subtracted. They share nothing with the variational equations but the way from a config to equations (and the
+product of quaternions, by which a start is turned). The
 largest difference along the run, relative to the derivative's largest value there, may be 1e-9.
 
 Run: python -m experiments.sensitivity_campaign [--scenes 200] [--first 0]      exit code 1 if one is off
@@ -21,6 +22,7 @@ import numpy as np
 import rigidsim
 from experiments.common import Command
 from rigidsim.scene.parts_of_values import parts_in
+from rigidsim.scene.rotations import product
 from rigidsim.scene.varied_keys import varied_keys
 from rigidsim.workflows.read import parse
 
@@ -55,26 +57,25 @@ def _start(draw: random.Random) -> str:
 
 _STARTS = [f"initial.angular_velocity[{i}]" for i in range(3)] + [f"initial.attitude[{i}]" for i in range(3)]
 _MOMENTS = [f"body.principal_moments[{i}]" for i in range(3)]
-_ORBIT = """orbit = {{semi_major_axis = {a:.6f}, eccentricity = {e:.6f}, inclination = "{i:.4f} deg",
-  ascending_node = {n:.5f}, periapsis = {p:.5f}, mean_anomaly = {m:.5f}}}
-""".replace("\n  ", " ")
 _IN_ORBIT = ["semi_major_axis", "eccentricity", "inclination", "ascending_node", "periapsis", "mean_anomaly"]
 
 
-def _orbit(draw: random.Random) -> str:
-    return _ORBIT.format(
-        a=draw.uniform(1, 2),
-        e=draw.choice([0.01, draw.uniform(0.01, 0.4)]),
-        i=draw.uniform(0, 180),
-        n=draw.uniform(0, 6),
-        p=draw.uniform(0, 6),
-        m=draw.uniform(0, 6),
-    )
+def _turning(draw: random.Random, load: str = "", moments: str = "") -> str:
+    """A body with principal moments that are drawn unless given, its start, and a load."""
+    return f"[body]\nprincipal_moments = {moments or _moments(draw)}\n{_start(draw)}{load}"
+
+
+def _gravity_gradient(draw: random.Random) -> str:
+    a, e = draw.uniform(1, 2), draw.choice([0.01, draw.uniform(0.01, 0.4)])
+    texts = f"{a:.6f}", f"{e:.6f}", f'"{draw.uniform(0, 180):.4f} deg"'
+    texts += tuple(f"{draw.uniform(0, 6):.5f}" for _ in range(3))
+    orbit = ", ".join(f"{key} = {text}" for key, text in zip(_IN_ORBIT, texts, strict=True))
+    return f'[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 1.2\norbit = {{{orbit}}}\n'
 
 
 def _free(draw: random.Random) -> tuple[str, list[str]]:
     if draw.random() < 0.5:
-        return f"[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}", _STARTS + _MOMENTS
+        return _turning(draw), _STARTS + _MOMENTS
     off = [draw.choice([0.0, draw.uniform(-0.2, 0.2)]) for _ in range(3)]
     a, b, c = (draw.uniform(1.5, 2) for _ in range(3))
     rows = [[a, off[0], off[1]], [off[0], b, off[2]], [off[1], off[2], c]]
@@ -84,13 +85,12 @@ def _free(draw: random.Random) -> tuple[str, list[str]]:
 
 
 def _symmetric(draw: random.Random) -> tuple[str, list[str]]:
-    return f"[body]\nprincipal_moments = [1.5, 1.5, {draw.uniform(1, 2):.5f}]\n{_start(draw)}", _MOMENTS
+    return _turning(draw, moments=f"[1.5, 1.5, {draw.uniform(1, 2):.5f}]"), _MOMENTS
 
 
 def _momentum(draw: random.Random) -> tuple[str, list[str]]:
     keys = [f"initial.angular_momentum[{i}]" for i in range(3)] + _STARTS[3:] + _MOMENTS
-    text = f"[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}"
-    return text.replace("angular_velocity", "angular_momentum"), keys
+    return _turning(draw).replace("angular_velocity", "angular_momentum"), keys
 
 
 def _shape(draw: random.Random) -> tuple[str, list[str]]:
@@ -106,14 +106,13 @@ def _torque(draw: random.Random) -> tuple[str, list[str]]:
     frame = draw.choice(["body", "space"])
     parts = '["a*wx + b*sin(c*t)", "-b*wy*exp(-c*wz^2)", "a*b*cos(c*t)"]'
     load = f'[[loads]]\nkind = "torque"\nframe = "{frame}"\ncomponents = {parts}\n'
-    text = f"{names}[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}{load}"
-    return text, _STARTS[::2] + _MOMENTS[:1] + 2 * ["parameters.a", "parameters.b", "parameters.c"]
+    keys = 2 * [f"parameters.{name}" for name in "abc"]
+    return names + _turning(draw, load), _STARTS[::2] + _MOMENTS[:1] + keys
 
 
 def _viscous(draw: random.Random) -> tuple[str, list[str]]:
     load = f'[[loads]]\nkind = "viscous_torque"\ncoefficients = [0.1, 0.02, {draw.uniform(0.01, 0.2):.4f}]\n'
-    text = f"[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}{load}"
-    return text, _MOMENTS[:1] + [f"loads[0].coefficients[{i}]" for i in range(3)]
+    return _turning(draw, load), _MOMENTS[:1] + [f"loads[0].coefficients[{i}]" for i in range(3)]
 
 
 def _top(draw: random.Random) -> tuple[str, list[str]]:
@@ -127,9 +126,8 @@ def _top(draw: random.Random) -> tuple[str, list[str]]:
 
 
 def _gradient(draw: random.Random) -> tuple[str, list[str]]:
-    load = f'[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 1.2\n{_orbit(draw)}'
     keys = ["loads[0].gravitational_parameter", *(f"loads[0].orbit.{key}" for key in _IN_ORBIT)]
-    return f"[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}{load}", [*_STARTS[::3], *keys]
+    return _turning(draw, _gravity_gradient(draw)), [*_STARTS[::3], *keys]
 
 
 def _flight(draw: random.Random) -> tuple[str, list[str]]:
@@ -143,30 +141,28 @@ def _flight(draw: random.Random) -> tuple[str, list[str]]:
 def _wheels(draw: random.Random) -> tuple[str, list[str]]:
     wheel = '[[rotors]]\nname = "wheel"\naxis = [0.2, 0.3, 1]\nmoment = 0.08\nrate = 4\ntorque = "-k*wz"\n'
     fixed = '[[rotors]]\nname = "second"\naxis = [1, 0, 0]\nmoment = 0.05\nrate = -3\nfixed = true\n'
-    text = f"[parameters]\nk = {draw.uniform(0.05, 0.2):.4f}\n[body]\nprincipal_moments = {_moments(draw)}\n"
+    parameter = f"[parameters]\nk = {draw.uniform(0.05, 0.2):.4f}\n"
     keys = ["rotors[0].moment", "rotors[0].rate", "rotors[1].rate", "rotors[0].axis[0]", "parameters.k"]
-    return text + _start(draw) + wheel + fixed, _MOMENTS[:2] + keys
+    return parameter + _turning(draw, wheel + fixed), _MOMENTS[:2] + keys
 
 
 def _core(draw: random.Random) -> tuple[str, list[str]]:
-    core = (
-        "[body.core]\nmoment = 0.2\nflattening = 0.05\nfriction = 0.03\nangular_velocity = [0.1, 0.2, 0.9]\n"
-    )
+    core = "moment = 0.2\nflattening = 0.05\nfriction = 0.03\nangular_velocity = [0.1, 0.2, 0.9]\n"
     keys = [f"body.core.{key}" for key in ("moment", "flattening", "friction", "angular_velocity[0]")]
-    body = f"[body]\nprincipal_moments = [1.6, 1.7, {draw.uniform(1.8, 2):.4f}]\n{core}"
+    body = f"[body]\nprincipal_moments = [1.6, 1.7, {draw.uniform(1.8, 2):.4f}]\n[body.core]\n{core}"
     return body + _start(draw), _MOMENTS[::2] + keys
 
 
 def _own(draw: random.Random) -> tuple[str, list[str]]:
     state = '[[states]]\nname = "integral"\ninitial = 0.2\nderivative = "wz - g*integral"\n'
     load = '[[loads]]\nkind = "torque"\ncomponents = ["-0.2*wx", "0", "-g*integral"]\n'
-    text = f"[parameters]\ng = {draw.uniform(0.2, 0.6):.4f}\n[body]\nprincipal_moments = {_moments(draw)}\n"
-    return text + _start(draw) + load + state, ["parameters.g", "states[0].initial", *_MOMENTS[1:]]
+    parameter = f"[parameters]\ng = {draw.uniform(0.2, 0.6):.4f}\n"
+    return parameter + _turning(draw, load + state), ["parameters.g", "states[0].initial", *_MOMENTS[1:]]
 
 
 def _elastic(draw: random.Random) -> tuple[str, list[str]]:
     part = "[body.elasticity]\nlove_number = 6e-13\ndelay = 0.05\nradius = 1.2\nmean_rate = 0.8\n"
-    load = f'[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 1.2\n{_orbit(draw)}'
+    load = _gravity_gradient(draw)
     keys = [f"body.elasticity.{key}" for key in ("love_number", "delay", "radius")]
     body = f"[body]\nprincipal_moments = [1.6, 1.7, 1.9]\nmass = 1.5\n{part}"
     return body + _start(draw) + load, [*keys, "loads[0].orbit.semi_major_axis", _STARTS[0], _STARTS[3]]
@@ -175,7 +171,7 @@ def _elastic(draw: random.Random) -> tuple[str, list[str]]:
 def _dipole(draw: random.Random) -> tuple[str, list[str]]:
     load = f'[[loads]]\nkind = "magnetic_dipole"\nmoment = {_vector(draw)}\nfield = {_vector(draw)}\n'
     keys = ["loads[0].moment[0]", "loads[0].field[2]"]
-    return f"[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}{load}", _STARTS[1:4] + keys
+    return _turning(draw, load), _STARTS[1:4] + keys
 
 
 FAMILIES = {
@@ -207,20 +203,8 @@ hold_invariants = {held}
     return Case(number, family, text, draw.choice(keys))
 
 
-@dataclass(frozen=True)
-class Found:
+def checked(one: Case) -> dict[str, float]:
     """Largest error of each recorded derivative, relative to its largest value."""
-
-    errors: dict[str, float]
-
-    @property
-    def worst(self) -> float:
-        """Of all of them; infinite if nothing was compared."""
-        return max(self.errors.values(), default=float("inf"))
-
-
-def checked(one: Case) -> Found:
-    """The errors of one case."""
     base = parse(one.text, overrides=[f'output.sensitivity=["{one.key}"]', *_QUIET])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -232,7 +216,7 @@ def checked(one: Case) -> Found:
         if largest < _NONE:  # nothing there depends on the key
             largest = 1.0
         errors[name] = float(np.abs(found[name].to_numpy()[:, 0] - difference).max() / largest)
-    return Found(errors)
+    return errors
 
 
 _QUIET = ["output.timeline=false", "output.estimate=false"]
@@ -290,20 +274,11 @@ def _moved(given: Any, key: Any, step: Fraction) -> list[str]:
         text = f'"{value.numerator}/{value.denominator}"'
         return [f"{place}={text}" for place in key.places]
     with mpmath.workdps(60):
-        q = [
-            mpmath.mpf(x.rational.numerator) / x.rational.denominator for x in given.config.initial.quaternion
-        ]
-        half = mpmath.mpf(step.numerator) / step.denominator / 2
-        turn = [mpmath.cos(half)] + [
-            mpmath.sin(half) if i == key.component else mpmath.mpf(0) for i in range(3)
-        ]
-        (a, b, c, d), (e, f, g, h) = q, turn
-        turned = [
-            a * e - b * f - c * g - d * h,
-            a * f + b * e + c * h - d * g,
-            a * g - b * h + c * e + d * f,
-            a * h + b * g - c * f + d * e,
-        ]
+        given_q = given.config.initial.quaternion
+        q = [mpmath.mpf(x.rational.numerator) / x.rational.denominator for x in given_q]
+        half, turn = mpmath.mpf(step.numerator) / step.denominator / 2, [mpmath.mpf(0)] * 4
+        turn[0], turn[key.component + 1] = mpmath.cos(half), mpmath.sin(half)
+        turned = product(q, turn)
         return [f"initial.quaternion={[mpmath.nstr(x, 50) for x in turned]}".replace("'", '"')]
 
 
@@ -324,9 +299,10 @@ def campaign(scenes: int = 200, first: int = 0) -> int:
             print(f"{number:4d} {one.family:10s} {one.key:34s} refused: {error}", flush=True)
             off.append(number)
             continue
-        worst, beyond = max(worst, found.worst), found.worst > BOUND
+        largest = max(found.values(), default=float("inf"))  # if nothing was compared
+        worst, beyond = max(worst, largest), largest > BOUND
         off += [number] * beyond
-        shown = "  ".join(f"{name.split('_')[0]} {error:.1e}" for name, error in found.errors.items())
+        shown = "  ".join(f"{name.split('_')[0]} {error:.1e}" for name, error in found.items())
         print(f"{number:4d} {one.family:10s} {one.key:34s} {shown}{'  OFF' * beyond}", flush=True)
     print(f"{scenes} cases, largest relative error {worst:.1e}, {len(off)} off: {off}")
     return int(bool(off))

@@ -171,16 +171,10 @@ def librations() -> list[Check]:
             name = line.label.text
             if name in exact and (name == "pitch") == (angle == "pitch"):
                 found[name].append(float(line.frequency))
-    equations = {"pitch": "n sqrt(3 (B - A) / C)", "rollyaw1": "quartic", "rollyaw2": "quartic"}
+    quartic = "quartic; amplitude^2"
+    sources = {"pitch": "n sqrt(3 (B - A) / C); amplitude^2", "rollyaw1": quartic, "rollyaw2": quartic}
     return [
-        Check(
-            f"satellite: {name}, line {n + 1}",
-            rate,
-            exact[name],
-            1e-8,
-            "n",
-            f"{equations[name]}; amplitude^2",
-        )
+        Check(f"satellite: {name}, line {n + 1}", rate, exact[name], 1e-8, "n", sources[name])
         for name, rates in found.items()
         for n, rate in enumerate(rates or [float("nan")])
     ]

@@ -11,78 +11,53 @@ precisions, steps to 1e8 radians, and a campaign of random scenes.
 import sys
 import traceback
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from experiments.common import Answer, Check, Curve, Panel, Picture, Study
 from experiments.extremes.judging import Verdict, judge
-from experiments.extremes.scenes import ANY, Extreme, all_scenes, random_case
+from experiments.extremes.scenes import ANY, Extreme, Way, all_scenes, random_case
 
 SEED = 20240607
 RANDOM_SCENES = 1200
 KINDS = ("right", "announced", "refused", "SILENT")
 
 
-@dataclass(frozen=True)
-class Way:
-    """A column of the table."""
-
-    title: str
-    column: str
-    precision: str = "double"
-    hold: bool = False
-
-
-WAYS = tuple(Way(name.replace("_", " "), name) for name in ANY)
+WAYS = tuple(map(Way, ANY))
 MORE_WAYS = (
-    Way("quaternion, single", "quaternion", "single"),
-    Way("euler angles, single", "euler_angles", "single"),
-    Way("closed form, single", "closed_form", "single"),
-    Way("quaternion, extended", "quaternion", "extended"),
-    Way("euler angles, extended", "euler_angles", "extended"),
-    Way("quaternion, held", "quaternion", hold=True),
+    *(Way(column, "single") for column in ("quaternion", "euler_angles", "closed_form")),
+    *(Way(column, "extended") for column in ("quaternion", "euler_angles")),
+    Way("quaternion", hold=True),
 )
 
-Tell = Callable[[str], None]
 
-
-def examine(scenes: Iterable[Extreme], ways: Sequence[Way], tell: Tell) -> dict[Way, list[Verdict]]:
+def examine(scenes: Iterable[Extreme], ways: Sequence[Way]) -> dict[Way, list[Verdict]]:
     """Run every scene in every way that it is of interest for."""
     found: dict[Way, list[Verdict]] = {way: [] for way in ways}
     for scene in scenes:
         for way in ways:
-            if way.column not in scene.columns or (way.precision == "extended" and scene.end > 1e5):
-                continue
-            verdict = guarded(scene, way.column, way.precision, hold=way.hold)
-            found[way].append(verdict)
-            if verdict.kind == "SILENT":
-                tell(verdict.line)
+            if way.column in scene.columns and (way.precision != "extended" or scene.end <= 1e5):
+                found[way].append(guarded(scene, way))
     return found
 
 
-def guarded(scene: Extreme, column: str, precision: str, *, hold: bool = False) -> Verdict:
-    """``judge``; what breaks down is no refusal."""
+def guarded(scene: Extreme, way: Way) -> Verdict:
+    """``judge``; what breaks down is no refusal. What is silent is shown with its scene."""
     try:
-        return judge(scene, column, precision, hold=hold)
+        verdict = judge(scene, way)
     except Exception as error:
         traceback.print_exc()
-        text = f"broke down: {type(error).__name__}: {error}"
-        return Verdict(scene, column, precision, "SILENT", np.nan, np.nan, None, text)
+        verdict = Verdict(scene, way, "SILENT", f"broke down: {type(error).__name__}: {error}")
+    if verdict.kind == "SILENT":
+        print(f"{verdict.line}\n{scene.text(way)}", file=sys.stderr, flush=True)
+    return verdict
 
 
-def campaign(count: int, seed: int, tell: Tell) -> list[Verdict]:
+def campaign(count: int, seed: int) -> list[Verdict]:
     """Random scenes, formulations, precisions and tolerances."""
     generator = np.random.default_rng(seed)
-    found = []
-    for _ in range(count):
-        scene, column, precision, hold = random_case(lambda a, b: float(generator.uniform(a, b)))
-        verdict = guarded(scene, column, precision, hold=hold)
-        found.append(verdict)
-        if verdict.kind == "SILENT":
-            tell(f"{verdict.line}\n{scene.text(column, precision, hold=hold)}")
-    return found
+    return [guarded(*random_case(lambda a, b: float(generator.uniform(a, b)))) for _ in range(count)]
 
 
 def tabulated(found: dict[Way, list[Verdict]]) -> str:
@@ -133,13 +108,12 @@ def picture(verdicts: Sequence[Verdict]) -> Picture:
 @Study
 def extremes(full: bool, random: int = -1) -> Answer:
     """The table, and so many random scenes (1200 with --full)."""
-    tell = lambda text: print(text, file=sys.stderr, flush=True)  # noqa: E731
-    found = examine(all_scenes(full), WAYS + (MORE_WAYS if full else ()), tell)
+    found = examine(all_scenes(full), WAYS + (MORE_WAYS if full else ()))
     for ways in (WAYS, MORE_WAYS) if full else (WAYS,):
         print(tabulated({way: found[way] for way in ways}) + "\n")
     verdicts = [v for part in found.values() for v in part]
     print(totals(verdicts))
-    drawn = campaign(random if random >= 0 else RANDOM_SCENES if full else 0, SEED, tell)
+    drawn = campaign(random if random >= 0 else RANDOM_SCENES if full else 0, SEED)
     print("random scenes: " + totals(drawn))
     silent = sum(v.kind == "SILENT" for v in verdicts + drawn)
     check = Check("runs that are wrong in silence", silent, 0, 0.0, "1", "none may", "absolute")

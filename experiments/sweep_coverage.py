@@ -104,11 +104,8 @@ def picture(told: Sequence[tuple[str, Found]]) -> Picture:
 def line(kind: str, what: str, found: Found) -> str:
     """Of the table."""
     ratio, warned = found.ratio, found.warned
-    caution = (
-        np.median(found.announced[~warned] / np.maximum(found.true[~warned], 1e-300))
-        if (~warned).any()
-        else math.nan
-    )
+    times = found.announced[~warned] / np.maximum(found.true[~warned], 1e-300)
+    caution = np.median(times) if len(times) else math.nan
     beyond = int(((ratio > _WORST_RATIO) & ~warned).sum())
     name = kind if what == "attitude" else f"{kind}: {what}"
     above = int((ratio > _MOST_RATIO).sum())

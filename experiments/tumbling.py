@@ -2,7 +2,7 @@
 
 Moments a < b < c in this order; short-axis mode (SAM) where L^2 > 2 E b: L circles the axis of the largest
 moment in the body, which for an asteroid is its shortest axis; long-axis mode (LAM) else. Formulas: Landau &
-Lifshitz, Mechanics, section 37; Jacobi's functions by Landen's transformation (Abramowitz & Stegun 16.4).
+Lifshitz, Mechanics, section 37; Jacobi's functions by SciPy.
 Good to about 1e-13 away from the separatrix, which is what studies of measured bodies need; the digits of
 ``closed_forms`` are for comparisons with runs.
 """
@@ -10,8 +10,8 @@ Good to about 1e-13 away from the separatrix, which is what studies of measured 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ellipj, ellipkm1
 
-_LANDEN = 9  # steps: quadratic convergence, 1 - m down to 1e-30
 _POINTS = 64  # of a mean over half a period; the rest falls like exp(-64 pi K(1 - m) / K(m))
 
 
@@ -53,25 +53,11 @@ class Polhode:
     def rates(self, u: np.ndarray) -> np.ndarray:
         """Angular velocity at arguments (bodies,) or (bodies, points), body axes, (..., 3)."""
         wide = u if u.ndim == 2 else u[:, None]
-        sn, cn, dn = jacobi(wide, self.m[:, None])
+        sn, cn, dn, _ = ellipj(wide, np.maximum(self.m, 0)[:, None])  # rounding may make it negative
         told = np.stack([cn, sn, dn], axis=-1) * self.amplitudes[:, None, :]
         found = np.empty_like(told)
         np.put_along_axis(found, np.broadcast_to(self.order[:, None, :], told.shape), told, axis=-1)
         return found if u.ndim == 2 else found[:, 0]
-
-
-def jacobi(u: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """sn, cn, dn of real arguments, 0 <= m < 1."""
-    a, g = np.ones_like(m), np.sqrt(1 - m)
-    ratios = []
-    for _ in range(_LANDEN):
-        a, c, g = (a + g) / 2, (a - g) / 2, np.sqrt(a * g)
-        ratios.append(c / a)
-    phase = 2**_LANDEN * a * u
-    for ratio in reversed(ratios):
-        phase = (phase + np.arcsin(ratio * np.sin(phase))) / 2
-    sn = np.sin(phase)
-    return sn, np.cos(phase), np.sqrt(1 - m * sn * sn)
 
 
 def polhode(moments: np.ndarray, momentum: np.ndarray, excitation: np.ndarray) -> Polhode:
@@ -85,13 +71,10 @@ def polhode(moments: np.ndarray, momentum: np.ndarray, excitation: np.ndarray) -
     p = np.sqrt(along * (c - b) / (a * b * c))
     m = across * (a - b) / (along * (c - b))
     complement = (c - a) * (square - twice * b) / (along * (c - b))
-    mean, g = np.ones_like(m), np.sqrt(complement)
-    for _ in range(_LANDEN):
-        mean, g = (mean + g) / 2, np.sqrt(mean * g)
     amplitudes = np.sqrt(
         np.stack([across / (a * (a - c)), across / (b * (b - c)), along / (c * (c - a))], axis=1)
     )
-    return Polhode(order, amplitudes, p, m, np.pi / (2 * mean))
+    return Polhode(order, amplitudes, p, m, ellipkm1(complement))
 
 
 def tumbling(moments: np.ndarray, momentum: np.ndarray, excitation: np.ndarray) -> Tumbling:
@@ -105,14 +88,8 @@ def tumbling(moments: np.ndarray, momentum: np.ndarray, excitation: np.ndarray) 
     x, y = rates[..., 0] ** 2, rates[..., 1] ** 2
     turning = momentum * ((a * x + b * y) / (a * a * x + b * b * y)).mean(axis=1)
     twice = excitation * momentum**2 / moments[:, 2]
-    return Tumbling(
-        momentum,
-        path.order[:, 2] == 2,
-        excitation,
-        4 * path.quarter / path.p,
-        2 * np.pi / turning,
-        twice / momentum,
-    )
+    rotation, precession = 4 * path.quarter / path.p, 2 * np.pi / turning
+    return Tumbling(momentum, path.order[:, 2] == 2, excitation, rotation, precession, twice / momentum)
 
 
 def tumbling_of(moments: np.ndarray, rates: np.ndarray) -> Tumbling:

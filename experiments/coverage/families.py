@@ -296,17 +296,5 @@ def coverage_scene(number: int, seed: int = 1, name: str = "") -> CoverageScene:
         integrator.append("hold_invariants = true")
     if family.averaged:
         integrator = []
-    parameters = ["[parameters]", *draw.parameters] if draw.parameters else []
-    lines = [
-        f'name = "coverage{number}"',
-        *parameters,
-        "[body]",
-        *draw.lines,
-        *draw.more,
-        "[time]",
-        *span,
-        "[integrator]",
-        *integrator,
-        "[output]\ntimeline = false",
-    ]
-    return CoverageScene(number, name, "\n".join(lines) + "\n", radians)
+    text = draw.text(f"coverage{number}", span, integrator)
+    return CoverageScene(number, name, text, radians)

@@ -9,6 +9,7 @@ from rigidsim.scene.sweeps.sweep import Sweep
 
 _HEAD = """
 name = "{kind}"
+time = {{end = {end}, samples = 2}}
 [output]
 record = [{record}]
 timeline = false
@@ -21,12 +22,10 @@ tile = 64
 _FREE = """
 body.principal_moments = [1, 2, 2.5]
 initial.angular_velocity = [0.1, 1, 0.05]
-time = {{end = {end}, samples = 2}}
 """
 _ORBIT = """
 body.principal_moments = [1, 1.5, 1.8]
 initial = {{angular_velocity = [0.1, 0.2, 1.1], euler_angles = [0.3, 0.1, 0]}}
-time = {{end = {end}, samples = 2}}
 [[loads]]
 kind = "gravity_gradient"
 gravitational_parameter = 1
@@ -36,7 +35,6 @@ orbit = {{semi_major_axis = 1, eccentricity = 0.1, inclination = 0.2, mean_anoma
 _PLANAR = """
 body.principal_moments = [34021, 49096, 57125]
 initial = {{euler_angles = [0, 0, 0], angular_velocity = [0, 0, 1]}}
-time = {{end = {end}, samples = 2}}
 integrator = {{formulation = "planar", tolerance = {tolerance}}}
 [[loads]]
 kind = "gravity_gradient"
@@ -46,7 +44,6 @@ orbit = {{semi_major_axis = 1, eccentricity = 0.1}}
 _TOP = """
 body = {{principal_moments = [1, {second}, 0.5], mass = 1, center_of_mass = [0, 0, 0.3]}}
 initial = {{angular_velocity = [0.1, 0.2, 5], euler_angles = [0, 0.5, 0]}}
-time = {{end = {end}, samples = 2}}
 [[loads]]
 kind = "uniform_gravity"
 acceleration = [0, 0, -9.8]
@@ -55,7 +52,6 @@ _DRIVEN = """
 parameters = {{k = 0.1, n = 1}}
 body.principal_moments = [1, 2, 2.5]
 initial.angular_velocity = [0.1, 0.2, 1]
-time = {{end = {end}, samples = 2}}
 [[loads]]
 kind = "torque"
 components = ["k*sin(n*t)", "k*cos(n*t)^2/3", "-k*wz/9"]
@@ -64,7 +60,6 @@ frame = "body"
 _GYROSTAT = """
 body.principal_moments = [1, 2, 2.5]
 initial.angular_velocity = [0.1, 0.2, 1]
-time = {{end = {end}, samples = 2}}
 rotors = [
   {{name = "free", axis = [0, 0.6, 0.8], moment = 0.1, rate = 5}},
   {{name = "driven", axis = [1, 0, 0], moment = 0.05, rate = -8, torque = "0.02*sin(0.7*t)"}},
@@ -74,7 +69,6 @@ _LAWS = """
 parameters.k = 0.5
 body.principal_moments = [1, 2, 2.5]
 initial.angular_velocity = [0.1, 0.2, 0.3]
-time = {{end = {end}, samples = 2}}
 states = [
 {{name = "slow", unit = "rad/s", derivative = "(wz - slow)/(3 s)"}},
 {{name = "slosh", unit = "rad", derivative = "rolling"}},
@@ -88,7 +82,6 @@ frame = "body"
 _FLIGHT = """
 body = {{principal_moments = [1, 1.6, 2], mass = 1}}
 initial = {{angular_velocity = [0.01, 0.02, 0.03], position = [30, 0, 0], velocity = [0, 0.05, 0]}}
-time = {{end = {end}, samples = 2}}
 [[loads]]
 kind = "central_gravity"
 gravitational_parameter = 1
@@ -117,7 +110,7 @@ class Kind:
             f'axes."{key}" = {{{spec}, count = {members}, name = "axis_{n}"}}'
             for n, (key, spec) in enumerate(self.axes.items())
         ]
-        head, output = _HEAD.format(kind=kind, record=record, seed=seed).split("[output]")
+        head, output = _HEAD.format(kind=kind, record=record, seed=seed, **self.given).split("[output]")
         return Sweep.of(parse(head + self.text.format(**self.given) + "[output]" + output + "\n".join(lines)))
 
 

@@ -17,6 +17,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -72,9 +73,8 @@ def disturb_sweeps(tally: Tally, kills: int, draw: random.Random, folder: Path, 
                     break
                 done += 1
             kept = disturbed.tiles()
-            found = (
-                resume_sweep(out / "kills") if disturbed.folder.is_sweep else sweep(parse(CONFIG), out=out)
-            )
+            begun = disturbed.folder.is_sweep
+            found = resume_sweep(out / "kills") if begun else sweep(parse(CONFIG), out=out)
             tally.expect(found.finished, f"{way}: not finished")
             tally.expect(kept.items() <= disturbed.tiles().items(), f"{way}: tiles were computed again")
             difference = same(open_sweep(out / "kills").dataset.load(), whole)
@@ -83,6 +83,7 @@ def disturb_sweeps(tally: Tally, kills: int, draw: random.Random, folder: Path, 
             tally.tell(f"{done} of {kills} disturbances ({way})")
 
 
+@dataclass
 class _Sweep:
     """One sweep that is disturbed in one way.
 
@@ -91,19 +92,18 @@ class _Sweep:
         cluster: of Dask, or None.
     """
 
-    def __init__(
-        self,
-        tally: Tally,
-        way: str,
-        draw: random.Random,
-        config: Path,
-        out: Path,
-        duration: float,
-        cluster: Any,
-    ) -> None:
-        self.tally, self.way, self.draw, self.config, self.out = tally, way, draw, config, out
-        self.duration, self.cluster = duration, cluster
-        self.folder = SweepFolder(out / "kills")
+    tally: Tally
+    way: str
+    draw: random.Random
+    config: Path
+    out: Path
+    duration: float
+    cluster: Any
+
+    @property
+    def folder(self) -> SweepFolder:
+        """Of the sweep itself."""
+        return SweepFolder(self.out / "kills")
 
     def tiles(self) -> dict[str, int]:
         """Tiles, and when each was written."""
@@ -158,9 +158,8 @@ class _Sweep:
             os.killpg(child.pid, signal.SIGKILL)
             child.wait()
             return True
-        disturbed = (
-            self._kill_worker(child.pid) if self.way == "worker" else self._kill_cluster_workers(child)
-        )
+        kill = self._kill_worker if self.way == "worker" else self._kill_cluster_workers
+        disturbed = kill(child)
         try:
             child.wait(_PATIENCE)
         except subprocess.TimeoutExpired:
@@ -170,10 +169,10 @@ class _Sweep:
         self.expect(child.returncode == 0, f"the sweep ended with {child.returncode}")
         return disturbed
 
-    def _kill_worker(self, pid: int) -> bool:
+    def _kill_worker(self, child: Any) -> bool:
         """One of a sweep's; whether there was any."""
         found = []
-        for text in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
+        for text in Path(f"/proc/{child.pid}/task/{child.pid}/children").read_text().split():
             with suppress(OSError):
                 if b"spawn_main" in Path(f"/proc/{text}/cmdline").read_bytes():
                     found.append(int(text))

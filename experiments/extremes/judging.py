@@ -13,7 +13,7 @@ import mpmath
 
 import rigidsim
 from experiments.coverage.judging import Kept, angle, apart, gone_through
-from experiments.extremes.scenes import Extreme
+from experiments.extremes.scenes import Extreme, Way
 from rigidsim.accuracy.error_law import round_off_law
 from rigidsim.errors import ConfigError
 from rigidsim.scene.cautions import WarningCode
@@ -48,43 +48,36 @@ class Verdict:
     """
 
     scene: Extreme
-    column: str
-    precision: str
+    way: Way
     kind: str
-    error: float
-    bound: float
-    estimate: float | None
     text: str
+    error: float = math.nan
+    bound: float = math.nan
+    estimate: float | None = None
 
     @property
     def line(self) -> str:
         """For lists of what went wrong."""
         estimate = "none" if self.estimate is None else f"{self.estimate:.2e}"
         return (
-            f"{self.kind}: {self.scene.row} / {self.scene.name} / {self.column} / {self.precision}: error "
+            f"{self.kind}: {self.scene.row} / {self.scene.name} / {self.way.title}: error "
             f"{self.error:.2e}, bound {self.bound:.2e}, estimate {estimate}; {self.text}"
         )
 
 
-def judge(scene: Extreme, column: str, precision: str, *, hold: bool = False) -> Verdict:
-    """Run a scene in one formulation."""
-
-    def verdict(
-        kind: str, text: str, error: float = math.nan, bound: float = math.nan, own: Any = None
-    ) -> Verdict:
-        return Verdict(scene, column, precision, kind, error, bound, own, text)
-
+def judge(scene: Extreme, way: Way) -> Verdict:
+    """Run a scene in one way."""
     try:
-        prepared = prepare(rigidsim.parse(scene.text(column, precision, hold=hold)))
+        prepared = prepare(rigidsim.parse(scene.text(way)))
         samples, progress, *_ = gone_through(prepared, MOST_STEPS)
     except ConfigError as refusal:
-        return verdict("refused", str(refusal).replace("\n", " "))
+        return Verdict(scene, way, "refused", str(refusal).replace("\n", " "))
     if progress.status is not Status.FINISHED:
-        return verdict("refused", f"the run ended: {progress.status.value}")
+        return Verdict(scene, way, "refused", f"the run ended: {progress.status.value}")
     diagnostics = Diagnostics(prepared, progress, samples.statistics).estimated(samples.trail)
     assert diagnostics.estimate is not None
     found, estimate = diagnostics.cautions(), diagnostics.estimate.leading
-    error = _largest_error(scene, column, prepared, samples)
+    error = _largest_error(scene, way.column, prepared, samples)
     epsilon = float(prepared.precision.epsilon)
     duration = float(samples.times[-1] - samples.times[0])
     tolerance, rate = max(prepared.effective_tolerance, epsilon), float(prepared.system.rate_bound)
@@ -100,7 +93,7 @@ def judge(scene: Extreme, column: str, precision: str, *, hold: bool = False) ->
         kind = "right"
     elif doubts or covered:
         kind = "announced"
-    return verdict(kind, "; ".join(c.text for c in found), error, bound, estimate)
+    return Verdict(scene, way, kind, "; ".join(c.text for c in found), error, bound, estimate)
 
 
 def _largest_error(scene: Extreme, column: str, prepared: InitialValueProblem, samples: Kept) -> float:
@@ -125,7 +118,7 @@ def reference(scene: Extreme) -> ClosedForm:
     Raises:
         ValueError: it has none, and doesn't belong into the table.
     """
-    text = scene.text("closed_form", _DIGITS)
+    text = scene.text(Way("closed_form", _DIGITS))
     if text not in _known:
         try:
             _known[text] = closed_form_of(prepare(rigidsim.parse(text)).scene)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import permutations
+from itertools import permutations, product
 
 SEQUENCES = (*("".join(p) for p in permutations("xyz")), "xyx", "xzx", "yxy", "yzy", "zxz", "zyz")
 ANY = ("rates", "quaternion", "euler_angles", "rotation_matrix", "canonical", "closed_form")
@@ -12,6 +12,26 @@ EULER = ("euler_angles", "canonical")
 TILTED = (4, 3, 2, 1)
 UPRIGHT = (1, 0, 0, 0)
 _BITS = 16  # of an end: a sample at a quarter of it is a number of every precision
+
+
+@dataclass(frozen=True)
+class Way:
+    """How a scene is run.
+
+    Attributes:
+        column: of the table: a formulation, or "closed_form".
+        hold: whether invariants are held.
+    """
+
+    column: str
+    precision: str | int = "double"
+    hold: bool = False
+
+    @property
+    def title(self) -> str:
+        """In words."""
+        more = ", held" if self.hold else f", {self.precision}" if self.precision != "double" else ""
+        return self.column.replace("_", " ") + more
 
 
 @dataclass(frozen=True)
@@ -42,10 +62,10 @@ class Extreme:
     angles: tuple[str, ...] | None = None
     columns: Sequence[str] = ANY
 
-    def text(self, column: str, precision: str | int, *, hold: bool = False) -> str:
-        """The config of this scene in one formulation, or in closed form; five samples."""
-        closed = column == "closed_form"
-        record = "angular_velocity" if column == "rates" else "quaternion"
+    def text(self, way: Way) -> str:
+        """The config of this scene; five samples."""
+        closed = way.column == "closed_form"
+        record = "angular_velocity" if way.column == "rates" else "quaternion"
         attitude = f"quaternion = {written(self.quaternion)}"
         if self.angles is not None:
             attitude = f"euler_angles = {written(self.angles)}"
@@ -54,11 +74,11 @@ class Extreme:
         return (
             f'name = "extreme"\n[body]\n{self.body}\n[initial]\nangular_velocity = {written(self.rates)}\n'
             f"{attitude}\n{load if self.gravity else ''}[time]\ntimes = {written(times)}\n[integrator]\n"
-            f"precision = {precision if isinstance(precision, int) else repr(precision)}\n"
+            f"precision = {way.precision!r}\n"
             f"tolerance = {self.tolerance or 'auto'!r}\n"
-            f"formulation = '{'auto' if closed else column}'\n"
+            f"formulation = '{'auto' if closed else way.column}'\n"
             f"method = '{'closed_form' if closed else 'taylor'}'\n"
-            f"euler_sequence = '{self.sequence}'\nhold_invariants = {str(hold).lower()}\n"
+            f"euler_sequence = '{self.sequence}'\nhold_invariants = {str(way.hold).lower()}\n"
             f'[output]\nrecord = ["{record}"]\ntimeline = false\n'
         )
 
@@ -96,17 +116,8 @@ def all_scenes(full: bool) -> list[Extreme]:
     Args:
         full: horizons to 1e8 radians for steps, where 1e6 else.
     """
-    return [
-        *separatrix(),
-        *moments(),
-        *sizes(),
-        *horizons(full),
-        *euler_singularities(),
-        *spins(),
-        *denormals(),
-        *tolerances(),
-        *tops(),
-    ]
+    free = [*separatrix(), *moments(), *sizes(), *horizons(full), *euler_singularities(), *spins()]
+    return [*free, *denormals(), *tolerances(), *tops()]
 
 
 ASYMMETRIC = principal(3, 6, 8)
@@ -176,11 +187,9 @@ def euler_singularities() -> Iterator[Extreme]:
     """Starts in, beside and on the way through the singularity of every sequence."""
     for sequence in SEQUENCES:
         proper = sequence[0] == sequence[2]
-        middle = sequence.index(sequence[1])
         axis = "xyz".index(sequence[1])
         spin = tuple(1.0 if i == axis else 0.0 for i in range(3))
         general = tuple(1.0 if i == axis else 0.3 for i in range(3))
-        assert middle == 1
         for end in (0, 1):
             if proper:
                 exact = "0" if not end else "180 deg"
@@ -230,21 +239,15 @@ def denormals() -> Iterator[Extreme]:
 
 def tolerances() -> Iterator[Extreme]:
     """From 1 to far below eps."""
-    for power in (0, -1, -2, -3, -6, -9, -12, -15, -16, -17, -20, -30, -100, -300):
-        row = f"tolerance 1e{power}" if power else "tolerance 1"
-        if power < -16:
-            row = "tolerance 1e-17 to 1e-300"
-        elif power < -9:
-            row = "tolerance 1e-12 to 1e-16"
-        elif power < -1:
-            row = "tolerance 1e-2 to 1e-9"
-        else:
-            row = "tolerance 1 and 0.1"
-        columns = [c for c in ANY if c != "closed_form"]
-        for radians in (10.0, 1000.0):
+    columns = [c for c in ANY if c != "closed_form"]
+    for row, powers in (
+        ("1 and 0.1", (0, -1)), ("1e-2 to 1e-9", (-2, -3, -6, -9)),
+        ("1e-12 to 1e-16", (-12, -15, -16)), ("1e-17 to 1e-300", (-17, -20, -30, -100, -300)),
+    ):  # fmt: skip
+        for power, radians in product(powers, (10.0, 1000.0)):
             yield Extreme(
-                row, f"1e{power}, {radians:g} rad", ASYMMETRIC, (0.3, 1, 0.2), lasting(radians, 1),
-                tolerance=float(f"1e{power}"), columns=columns,
+                f"tolerance {row}", f"1e{power}, {radians:g} rad", ASYMMETRIC, (0.3, 1, 0.2),
+                lasting(radians, 1), tolerance=float(f"1e{power}"), columns=columns,
             )  # fmt: skip
 
 
@@ -274,8 +277,8 @@ Uniform = Callable[[float, float], float]
 """A number between two others: of a generator, or drawn by hypothesis."""
 
 
-def random_case(uniform: Uniform) -> tuple[Extreme, str, str, bool]:
-    """A free body, and how to run it: formulation, precision, whether its invariants are held."""
+def random_case(uniform: Uniform) -> tuple[Extreme, Way]:
+    """A free body, and how to run it."""
 
     def one_of(choices: Sequence[str]) -> str:
         return choices[min(int(uniform(0, len(choices))), len(choices) - 1)]
@@ -296,7 +299,7 @@ def random_case(uniform: Uniform) -> tuple[Extreme, str, str, bool]:
         tolerance=tolerance, sequence=sequence,
         angles=(repr(uniform(-3, 3)), repr(middle), repr(uniform(-3, 3))),
     )  # fmt: skip
-    return scene, column, precision, column in ("rates", "quaternion") and uniform(0, 1) < 0.2
+    return scene, Way(column, precision, column in ("rates", "quaternion") and uniform(0, 1) < 0.2)
 
 
 def _signed(uniform: Uniform) -> float:

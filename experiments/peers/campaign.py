@@ -85,17 +85,13 @@ def measure(
 def _child(peer: str, request: dict[str, Any]) -> list[dict[str, Any]]:
     root = Path(__file__).parents[2]
     command = [sys.executable, "-m", "experiments.peers.child", peer, json.dumps(request)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=root, env=_environment())
+    single = os.environ | {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}  # seconds are all of the work
+    done = subprocess.run(command, capture_output=True, text=True, cwd=root, env=single)
     records = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
     if done.returncode:
         reason = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
         records.append({"broke": reason[0]})
     return records
-
-
-def _environment() -> dict[str, str]:
-    """One thread each, so that CPU seconds are those of the work."""
-    return os.environ | {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
 
 
 def _note(

@@ -55,7 +55,7 @@ def test_a_free_bodys_derivatives_obey_its_scaling_laws() -> None:
 
 @pytest.mark.parametrize("number", cases(range(100, 106), []))
 def test_random_keys_and_scenes_agree_with_higher_precision(number: int) -> None:
-    assert checked(case(number)).worst < BOUND
+    assert 0 <= max(checked(case(number)).values()) < BOUND
 
 
 WAYS = ['formulation = "euler_angles"\nhold_invariants = true', 'precision = "extended"']
