@@ -48,6 +48,11 @@ that is measured alone would be lost after its first step.
 """
 _HOPELESS = 32_768
 """Steps beyond four times the expected number after which a motion is given up, as before a collision."""
+_ALIKE = 1e-4
+"""Ratio of singular values of the gradients of invariants below which a direction isn't taken back. Runs
+leave those alone whose gradients are apart by less than 2^-9 rad; near a middle axis errors in these are
+what grows.
+"""
 _APART = 2.0**-30  # of a state's size, at which neighbours of a motion that switches show its tangents
 
 
@@ -383,7 +388,7 @@ class ErrorTangents:
             late = 0 * late
             if np.isfinite(states).all():
                 gradients = held.gradients(states[:, 0])
-                back, *_ = np.linalg.lstsq(gradients, gradients @ tangents[:, 0], rcond=1e-8)
+                back, *_ = np.linalg.lstsq(gradients, gradients @ tangents[:, 0], rcond=_ALIKE)
                 tangents[:, 0] -= back
             stride = stride - first
             if not ((begin < until) & (stride > 0)).all():
