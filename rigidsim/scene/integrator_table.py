@@ -57,7 +57,7 @@ class Integrator(ConfigTable):
     )
     hold_invariants: StrictBool | Literal["auto"] = "auto"
     """project the state onto its invariants, so that errors of long runs grow far more slowly; auto: from
-    step 1024 on, leaving shorter runs unchanged; in sweeps auto means false
+    step 8192 on, leaving shorter runs unchanged; in sweeps auto means false
     """
     accuracy: Annotated[Angle, _BELOW_HALF_A_TURN] | None = Field(
         None, examples=[1e-9], json_schema_extra={"x-above": 0, "x-below": 3}

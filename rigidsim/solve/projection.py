@@ -35,11 +35,15 @@ from rigidsim.model.system import System
 from rigidsim.solve.compiled import CompiledFunction, compiled_function
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 
-LATE = 1024
-"""Natural steps after which ``hold_invariants = "auto"`` begins to project, so that short runs compile
-nothing for it. What rounding did to the phase until then is taken back as far as two residuals tell it:
-errors of six bodies at 1e5 units of time are 0.3 to 2.4e-12 rad (from 4096 steps on 0.7e-12 to 1e-11). A
+LATE = 8192
+"""Natural steps after which ``hold_invariants = "auto"`` begins to project: some milliseconds of double
+precision, in which errors of rounding are still small; what they did to the phase is known, and taken back. A
 fixed count: a run that is prolonged past it is the run in one go.
+"""
+
+NOTED = 1024
+"""Natural steps from one state that is noted before ``LATE`` to the next. What they say of the invariants is
+worked out when projection begins, so that a shorter run compiles nothing for it.
 """
 
 STEPS_BETWEEN = 128
@@ -49,8 +53,9 @@ them, and errors at 1e6 radians are some 5e-13 rad (with 64: 3e-13, a tenth; wit
 """
 
 LATE_BETWEEN = 512
-"""The same for ``hold_invariants = "auto"``, whose errors have their share from before it began: for six
-bodies at 1e6 units of time 2e-12 to 1e-11 rad (3e-8 without), for a quarter of the corrections.
+"""The same for ``hold_invariants = "auto"``, whose errors have their share from before it began: for bodies
+(3, 1, 2) and (1, 2, 3) at 1e6 units of time 1.4e-12 and 4.5e-12 rad (with 256: 3.2e-12 and 2.0e-12, with
+1024: 6.2e-12 and 1.1e-11; 3.8e-8 and 2.5e-8 without), for a quarter of the corrections.
 """
 
 _STEPS_BETWEEN_IN_SINGLE = 256  # whose steps cost a quarter as much
@@ -101,22 +106,29 @@ class Projection:
         memory: all that later corrections depend on, changed in place and part of a checkpoint; float64
             (3 m + 3,): of each projected scalar its residual's integral over time, what was put back, and its
             residual after the latest correction; the time of that and the longest interval so far (internal
-            units), and the count of corrections left out since they were not small. It means the same in
-            another chart.
-        late: whether equations stay as they are, and projection begins after ``LATE`` steps.
+            units), and the count of corrections left out since they were not small; where it is ``late``,
+            whether it has begun, and the states noted until then. It means the same in another chart.
     """
 
     def __init__(self, system: System, precision: Precision, start: Scalar, *, late: bool = False) -> None:
         self._low, self._high = precision, one_higher(precision)
         self._system, self._start, self._chart = system, float(start), 0
         projected, self.left_out = projected_invariants(system)
-        self.names, m = [h.name for h in projected], len(projected)
-        self.memory, self.late = np.zeros(3 * m + 3), late
-        self._sums, self._then = self.memory[: 2 * m].reshape(2, m), self.memory[2 * m : 3 * m]
-        self._residuals_memory, self._times = self.memory[: 3 * m], self.memory[3 * m :]
+        self.names = [h.name for h in projected]
+        n, m = len(system.states), len(projected)
+        parts = len(precision.parts(precision.array(system.initial)))
+        self._notes = np.zeros((LATE // NOTED if late else 0, n * parts + 2))
+        self.memory = np.zeros(3 * m + 3 + late + self._notes.size)
+        if late:
+            self._notes = self.memory[-self._notes.size :].reshape(self._notes.shape)
+        self.late, self._parts = late, parts
+        self._sums, self._then = self.memory[: 2 * m], self.memory[2 * m : 3 * m]
+        self._residuals_memory, self._times = self.memory[: 3 * m], self.memory[3 * m : 3 * m + 3 + late]
         self._times[0] = self._start
         self._functions: dict[int, tuple[CompiledFunction, CompiledFunction]] = {}
         self._loaded = -1  # the chart whose functions are in use
+        if not late:
+            self._then[:] = self.residuals(precision.array(system.initial))
 
     def _prepare(self) -> None:
         """Compile the initial invariants and set up the rest once; a correction is a call of 7 us."""
@@ -134,19 +146,33 @@ class Projection:
         self._change, self._new_sums = self._result[:n], self._result[n:-1]
 
     @property
-    def begun(self) -> bool:
-        """Whether it corrects from now on."""
-        return bool(self._times[0] != self._start)
+    def holding(self) -> bool:
+        """Whether it corrects, or only notes states."""
+        return not self.late or self._times[3] == 1.0
+
+    def note(self, state: np.ndarray, time: Scalar, number: int) -> None:
+        """Note a state before projection begins, number 0 to ``LATE // NOTED`` - 1."""
+        row = self._notes[number]
+        row[0], row[1] = float(time), self._chart
+        row[2:] = np.concatenate(self._low.parts(state))
 
     def begin(self, state: np.ndarray, time: Scalar) -> None:
-        """Begin with the residuals so far, as the start and a state tell them; nothing is corrected yet."""
+        """Correct for the first time, with the residuals' integral over the noted states."""
         chart = self._chart
         self.use(0)
-        begun = self.residuals(self._low.array(self._system.initial))
+        self._then[:] = self.residuals(self._low.array(self._system.initial))
+        for now, there, *values in self._notes.tolist():
+            if now > self._times[0]:  # else none was taken
+                self.use(int(there))
+                parts = np.array(values).reshape(self._parts, -1)
+                noted = _sum([self._low.of_doubles(part) for part in parts])
+                self.project(noted.copy(), now)
+                self._then[:] = self.residuals(noted)  # of a state that stayed as it was
         self.use(chart)
-        self._then[:] = self.residuals(state)
-        self._sums[:] = (float(time) - self._start) * (begun + self._then) / 2, self._then - begun
-        self._times[0] = float(time)
+        self._times[1] = 0.0
+        self.project(state, time)
+        self._times[1] = 0.0  # what follows comes at intervals shorter than the one from the last note
+        self._times[3] = 1.0
 
     def use(self, chart: int) -> None:
         """Correct from now on in the states of the system (0) or of its partner (1)."""
@@ -189,7 +215,7 @@ class Projection:
             return
         # float64 so far: at most 250 digits, for which 1e-250 is well in range
         state -= self._change if cheap else self._low.of_doubles(self._change)
-        self._sums.flat = self._new_sums
+        self._sums[:] = self._new_sums
         self._state[:] = state if cheap else self._widened(state)
         self._residuals(self._state, outputs=self._left)
         self._then[:] = self._left
@@ -203,7 +229,7 @@ class Projection:
     @property
     def corrections(self) -> np.ndarray:
         """Corrections so far, (scalars,), over the drifts' scales: to first order the drifts without them."""
-        return self._sums[1].copy()
+        return self._sums[len(self.names) :].copy()
 
     # --- arithmetic -------------------------------------------------------------------------------------
 
