@@ -76,6 +76,10 @@ class Moments:
             for j, known in lines.items()
         }
 
+    def may_mistake(self, j: int) -> bool:
+        """Whether the engine may find a zero of a surface where none is: of a narrow function of time."""
+        return j in self._lines
+
     def sides(self, time: tuple[Scalar, Scalar]) -> dict[int, int]:
         """Sides of the surfaces that are known, of steps that begin at a time."""
         return dict(zip(self.timed, self._sides[bisect_right(self.knots, time)], strict=True))

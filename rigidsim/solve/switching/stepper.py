@@ -507,11 +507,10 @@ class SwitchingStepper(TaylorStepper):
         flipped[rows, crossed] = -flipped[rows, crossed]
         looks = [self._functions.looks(states, times, given) for given in (pars, flipped)]
         least = np.min([side * look.rates[crossed, rows] for look in looks], axis=0)
-        here = looks[0]
-        there = np.abs(here.u) <= _MISTAKEN * here.noises(before, states, here.field.T)
-        found = there[crossed, rows] & (
-            least > np.max([look.rate_noises[crossed, rows] for look in looks], axis=0)
-        )
+        noises = looks[0].noises(before, states, looks[0].field.T)
+        narrow = np.array([self._moments.may_mistake(j) for j in crossed])
+        there = ~narrow | (np.abs(looks[0].u) <= _MISTAKEN * noises)[crossed, rows]
+        found = there & (least > np.max([look.rate_noises[crossed, rows] for look in looks], axis=0))
         return found & ~self._functions.crosses_too(states, times, pars) if self.has_events else found
 
     # --- one step -------------------------------------------------------------------------------------------
@@ -653,7 +652,7 @@ class SwitchingStepper(TaylorStepper):
         """A surface on which the engine ended the step just taken, although it isn't there: as for a function
         far narrower than the step.
         """
-        if self._cut is None or self._modes[j := self._cut[0]] == SLIDES:
+        if self._cut is None or not self._moments.may_mistake(j := self._cut[0]):
             return None
         look = self._look(self.state, self.time, self._low)
         noise = look.noises(before, self.state, look.field.T)[j, 0]
