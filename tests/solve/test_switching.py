@@ -275,3 +275,12 @@ def test_events_are_kept_where_steps_are_taken_back() -> None:
         crossed += list(done.t_events[0])
     assert run.dataset["angular_velocity"].values[-1] == pytest.approx(state[:3], abs=1e-10)
     assert run.dataset["half_time"].values == pytest.approx(crossed, abs=1e-10)
+
+
+def test_surfaces_are_crossed_at_loose_tolerances() -> None:
+    """There a zero is found where the argument is as large as what the tolerance cuts off."""
+    rates = [
+        float(about_z("cos(t) - 0.5*max(wz, 0)", end="30", integrator=f"tolerance = {tolerance}\n")[1]["wz"])
+        for tolerance in (1e-15, 1e-6)
+    ]
+    assert abs(rates[0] - rates[1]) < 1e-4  # a hundred tolerances
