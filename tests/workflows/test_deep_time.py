@@ -111,3 +111,12 @@ def test_keys_of_averages_are_refused_without_one(config: Path) -> None:
         rigidsim.load(config).replace({"model.level": "full"})
     with pytest.raises(rigidsim.ConfigError, match="insolation"):
         rigidsim.run(rigidsim.load(config).replace({"output.insolation": None}), out=None)
+
+
+def test_in_double_precision_a_table_is_that_of_more_digits(config: Path) -> None:
+    double, more = (
+        loaded(rigidsim.run(rigidsim.load(config).replace({"integrator.precision": precision}), out=None))
+        for precision in ("double", "extended")
+    )
+    for name in ("precession", "orbit_eccentricity"):
+        np.testing.assert_allclose(double[name], more[name].astype(float), rtol=0, atol=1e-14)

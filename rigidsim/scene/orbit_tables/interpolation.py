@@ -10,8 +10,10 @@ Errors are measured by leaving out and interpolating every other row; for the el
 """
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -48,6 +50,32 @@ class Interpolation:
         w = s1 * square - b
         return np.array([y0, a, b, u * 10 - v * 4 + w, v * 7 - u * 15 - w * 2, u * 6 - v * 3 + w])
 
+    def narrow_pieces(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same of many pieces (n,) in 80 bits, which become doubles: lengths (n,) in units of
+        time, and coefficients (n, 6, columns). Columns must not grow beyond order one.
+        """
+        lengths, values = self._narrow
+        both = np.stack([numbers, numbers + 1])
+        first = np.clip(both - self._count // 2, 0, len(self.times) - self._count)
+        near = first[..., None] + np.arange(self._count)
+        ends = np.cumsum(lengths[near[..., :-1]], axis=-1)  # from the first of the rows around
+        offsets = np.concatenate([np.zeros((*both.shape, 1), np.longdouble), ends], axis=-1)
+        here = (both - first)[..., None]
+        offsets = offsets - np.take_along_axis(offsets, here, axis=-1)
+        d, s = (np.einsum("ani,anic->anc", w, values[near]) for w in _weights(offsets, here))
+        length = lengths[numbers]
+        y0, y1, step = values[numbers], values[numbers + 1], length[:, None]
+        a, b = d[0] * step, s[0] * step * step / 2
+        u, v, w = y1 - (y0 + a + b), d[1] * step - (a + 2 * b), s[1] * step * step / 2 - b
+        powers = [y0, a, b, 10 * u - 4 * v + w, 7 * v - 15 * u - 2 * w, 6 * u - 3 * v + w]
+        return length, np.stack(powers, axis=1)
+
+    @cached_property
+    def _narrow(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lengths between rows, and values, in 80 bits."""
+        lengths = [b - a for a, b in pairwise(self.times)]
+        return _in_80_bits(lengths), _in_80_bits(self.values.ravel()).reshape(self.values.shape)
+
     def _at(self, row: int) -> tuple[np.ndarray, np.ndarray]:
         """First and second derivatives (columns,) at a row, by finite differences."""
         if row not in self._derivatives:
@@ -75,6 +103,33 @@ class Interpolation:
             two[here] = -sum(w for i, w in enumerate(two) if i != here)
             self._weights[offsets] = np.array(one), np.array(two)
         return self._weights[offsets]
+
+
+def _in_80_bits(numbers: Iterable[Any]) -> np.ndarray:
+    """Numbers (mpf) as the platform's longest floating point, of at least double precision."""
+    exact = list(numbers)
+    high = np.array([float(x) for x in exact])
+    low = np.array([float(x - one) for x, one in zip(exact, high.tolist(), strict=True)])
+    return high.astype(np.longdouble) + low
+
+
+def _weights(offsets: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Weights of values at offsets (..., n) in the first and second derivative where one of them, of index
+    ``here``, is zero.
+    """
+    apart = offsets[..., :, None] - offsets[..., None, :]
+    apart[..., np.arange(offsets.shape[-1]), np.arange(offsets.shape[-1])] = 1
+    products = apart.prod(axis=-1)
+    inner = -offsets  # from the others to the row itself
+    np.put_along_axis(inner, here, 1, axis=-1)
+    one = np.take_along_axis(products, here, axis=-1) / (products * inner)
+    np.put_along_axis(one, here, 0, axis=-1)
+    centre = -one.sum(axis=-1, keepdims=True)
+    two = 2 * one * (centre - 1 / inner)
+    np.put_along_axis(one, here, centre, axis=-1)
+    np.put_along_axis(two, here, 0, axis=-1)
+    np.put_along_axis(two, here, -two.sum(axis=-1, keepdims=True), axis=-1)
+    return one, two
 
 
 def left_out(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

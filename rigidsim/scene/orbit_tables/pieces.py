@@ -141,6 +141,11 @@ class TabulatedOrbit:
             self._pieces[number] = {name: list(coefficients[:, i]) for i, name in enumerate(self.moving)}
         return self._pieces[number]
 
+    def narrow_pieces(self, numbers: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """See ``Interpolation``: lengths (n,), s, and for each changing element coefficients (n, 6)."""
+        lengths, found = self._interpolation.narrow_pieces(numbers)
+        return lengths, {name: found[:, :, i] for i, name in enumerate(self.moving)}
+
     def row(self, number: int) -> dict[str, Any]:
         """All elements of a row of the table."""
         return {name: x[number] if isinstance(x, list) else x for name, x in self._rows.items()}
