@@ -41,8 +41,8 @@ class Reversal:
         attitude: angle, rad; of an averaged motion, of the angular momentum's direction; None without either.
         rates: difference of angular velocities relative to their size; None where none are carried.
         position: distance, m; None for a body that doesn't fly.
-        announced: sum of both ways' estimated errors of the attitude, or of the rates without one, rad or
-            relative; None if they can't be estimated.
+        announced: estimated error of the attitude, or of the rates without one, rad or relative: of the way
+            there, as the way back amplifies it, and of the way back; None if they can't be estimated.
         steps: of both ways.
     """
 
@@ -107,12 +107,15 @@ def there_and_back(experiment: Experiment, loads: Sequence[Load] = ()) -> Revers
     back = _reversed(there, one.state)
     other = _taken(back, names, "the motion back")
     found = {_SMALL[name]: _apart(name, one[name], other[name]) for name in names}
-    announced = [_announced(problem, way) for problem, way in ((there, one), (back, other))]
+    begun, own = (
+        estimate_errors(problem, way.progress.steps, float(problem.scene.samples.last))
+        for problem, way in ((there, one), (back, other))
+    )
     return Reversal(
         attitude=found.get("attitude"),
         rates=found.get("rates"),
         position=found.get("position"),
-        announced=None if None in announced else float(sum(x for x in announced if x is not None)),
+        announced=None if begun is None or own is None else begun.leading * own.amplification + own.leading,
         steps=one.progress.steps + other.progress.steps,
     )
 
@@ -163,8 +166,3 @@ def _apart(name: str, there: list[np.ndarray], back: list[np.ndarray]) -> float:
     apart = float(distances_between(one, other)[0])
     size = max(float(np.linalg.norm(part[0], axis=1).max()) for part in (there, back))
     return apart / (size or 1.0) if name == "angular_velocity" else apart
-
-
-def _announced(problem: InitialValueProblem, way: Collected) -> float | None:
-    found = estimate_errors(problem, way.progress.steps, float(problem.scene.samples.last))
-    return None if found is None else found.leading
