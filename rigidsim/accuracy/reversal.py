@@ -151,9 +151,9 @@ def _reversed(there: InitialValueProblem, state: np.ndarray) -> InitialValueProb
     scene = _between(there.scene, there.scene.end, there.scene.start)
     scaling = replace(system.scaling, direction=-system.scaling.direction)
     plan = replace(system.plan, scene=scene, scaling=scaling)
-    again = System(plan, system.number, coefficients=system.coefficients).begun_at(
-        [scene.context.mpf(precision.exact(x)) for x in state]
-    )
+    off = 1 + scene.context.mpf(float(precision.epsilon)) / 8  # too little to change a number: it was rounded
+    begin = [scene.context.mpf(precision.exact(x)) * off for x in state]
+    again = System(plan, system.number, coefficients=system.coefficients, initial=begin)
     clock = SampleClock(scene.samples, precision, scaling)
     return replace(there, scene=scene, system=again, clock=clock)
 

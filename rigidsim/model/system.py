@@ -63,19 +63,20 @@ class System:
         *,
         chart: Formulation | None = None,
         coefficients: Rounder | None = None,
+        initial: Sequence[Any] | None = None,
     ) -> None:
         self.plan, self.number = plan, number
         self.formulation = chart or plan.formulation
         self.sequence = self.formulation.sequence or plan.scene.config.integrator.euler_sequence
         self.scene, self.scaling, self.requirements = plan.scene, plan.scaling, plan.requirements
         self.wide, self.clocked = plan.wide, plan.clocked
-        self._chart, self._coefficients = chart, coefficients
+        self._chart, self._coefficients, self._initial = chart, coefficients, initial
 
     # --- the same motion, rounded otherwise -----------------------------------------------------------------
 
     def rounded(self, number: Rounder) -> System:
         """The same system in another precision."""
-        return System(self.plan, number, chart=self._chart)
+        return System(self.plan, number, chart=self._chart, initial=self._initial)
 
     def with_coefficients(self, coefficients: Rounder) -> System:
         """The same system with the coefficients of its equations rounded otherwise, as in two parts."""
@@ -84,12 +85,6 @@ class System:
         other.__dict__.pop("equations", None)
         if other.__dict__.get("partner") is not None:
             other.__dict__["partner"] = other.__dict__["partner"].with_coefficients(coefficients)
-        return other
-
-    def begun_at(self, initial: Sequence[Any]) -> System:
-        """The same system from other states (mpf, internal units) on."""
-        other = copy.copy(self)
-        other.__dict__["_joined"] = replace(self._joined, initial=list(initial))
         return other
 
     @property
@@ -147,7 +142,7 @@ class System:
     @property
     def initial(self) -> list[Any]:
         """Initial values (mpf), internal units."""
-        return list(self._joined.initial)
+        return list(self._joined.initial if self._initial is None else self._initial)
 
     @property
     def state_exponents(self) -> list[int]:
