@@ -27,8 +27,10 @@ from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Matrix, Vector, apply, cross, dot, negligible, norm, parallel
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.tracing.numbers import Traced, plain
 
 _STATES = 3
+_SWEPT = "swept"  # numbers of a sweep's member that the probes have read
 _SPREAD = 8  # part of the start's distance and speed by which a flight's are varied
 
 Acting = tuple[Vector, Any]
@@ -54,16 +56,22 @@ class Probe(Mechanics):
     def _one(cls, m: Mechanics, draw: random.Random, about: Vector | None) -> Probe:
         scene, context, scaling = m.scene, m.scene.context, m.scaling
 
-        def number(x: Any) -> Any:
+        def real(x: Any) -> Any:
             mantissa, exponent = context.mpf(x).man_exp
             size = hy.real(mantissa, context.prec) * hy.real(2.0, context.prec) ** exponent
             return -size if x < 0 else size
+
+        def number(x: Any) -> Any:
+            if isinstance(x, Traced):  # zero in all members of a sweep or in none
+                m.made.setdefault(_SWEPT, []).append(x)
+                x = context.zero if x == 0 else x.value
+            return real(x)
 
         def drawn(count: int) -> Vector:
             return [context.mpf(draw.gauss(0, 1)) for _ in range(count)]
 
         def shown(vector: Vector) -> list[Any]:
-            return [hy.expression(number(x)) for x in vector]
+            return [hy.expression(real(plain(x))) for x in vector]  # a state is as good as another
 
         rates, quaternion, units = drawn(3), attitude.unit_quaternion(context, drawn(4)), m.numbers.rate_units
         if about is not None:
@@ -157,7 +165,14 @@ def turned_out(scene: Scene, loads: Sequence[Load], axis: Vector) -> Load | None
             size = sum(norm(context, vector) for vector, _ in terms)  # whose factors are of order 1
             if found is None or norm(context, cross(found[0], axis)) > negligible(context) * size:
                 return load
+    _share(m)
     return None
+
+
+def _share(m: Mechanics) -> None:
+    """Restrict members of a sweep to these numbers: what vanishes with them may not with others."""
+    for x in m.made.pop(_SWEPT, ()):
+        x.decided()
 
 
 def samples(m: Mechanics, about: Vector | None = None) -> list[list[Acting | None]]:
@@ -181,6 +196,7 @@ def spared(m: Mechanics, found: Sequence[Sequence[Acting | None]], axis: Vector)
                 rest, size = rest + part, size + acting[1]
         if abs(rest) > negligible(context) * size:
             return False
+    _share(m)
     return True
 
 

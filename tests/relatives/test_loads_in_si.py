@@ -1,6 +1,7 @@
 """Loads of users speak SI: their motion is scipy's of the same formulas, whatever the internal units are."""
 
 import random
+from collections.abc import Iterator
 from typing import Any
 
 import heyoka as hy
@@ -12,7 +13,7 @@ from support import seeds
 import rigidsim
 from rigidsim.model.loads import Load, StateBlock, seconds
 from rigidsim.model.observables import Observable, only_when_named
-from rigidsim.scene.registry import register_observable
+from rigidsim.scene.registry import OBSERVABLES, register_observable
 
 
 class Mixed(Load):
@@ -107,8 +108,10 @@ def scene(rng: random.Random, end: float, rate: float, inertia: float) -> dict[s
 
 
 @pytest.fixture(autouse=True, scope="module")
-def _observable() -> None:
+def _observable() -> Iterator[None]:
     register_observable(OWN)
+    yield
+    del OBSERVABLES[OWN.name]
 
 
 @pytest.mark.parametrize("seed", seeds(1, 40))

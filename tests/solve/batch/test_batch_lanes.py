@@ -169,3 +169,21 @@ def test_events_and_guards_end_members() -> None:
             assert set(block.status) == {status}
             assert (block.reached < 5).all()
             assert (block.steps <= 3).all() or status is Status.MAX_DRIFT
+
+
+@pytest.mark.parametrize("key", ["loads[0].gravitational_parameter", "loads[0].orbit.eccentricity"])
+def test_members_whose_loads_are_swept_go_together(key: str) -> None:
+    """Though loads are tried at states of numbers, to see what they conserve."""
+    load = 'kind = "gravity_gradient"\ngravitational_parameter = 1\n'
+    load += "orbit = {semi_major_axis = 1, eccentricity = 0.1}"
+    rates = "angular_velocity = [0.1, 0.2, 1]"
+    text = config(
+        "principal_moments = [1, 2, 2.5]",
+        rates,
+        load,
+        "end = 5\nsamples = 3",
+        output='record = ["quaternion"]',
+    )
+    found = Families(Members(swept(text, {key: "values = [0.1, 0.14, 0.17]"}))).sort()
+    assert len(found.groups) == 1
+    assert not found.alone
