@@ -125,13 +125,14 @@ class Probe(Mechanics):
             size += abs(x) * norm(context, vector)
         return total, size
 
-    def acting(self, load: Load, about: Vector | None) -> Acting | None:
+    def exerted(self, load: Load, about: Vector | None) -> Acting | None:
         """Torque of a load, space axes; with a point (m), together with its force's moment about that."""
         context, scaling = self.scene.context, self.scaling
         if _reads_more(load) or (found := self.added(terms := torque_terms(load, self))) is None:
             return None
         if terms and found[1] == 0:  # perhaps in this state alone
             return None
+        assert self.turn is not None
         total, size = apply(self.turn, found[0]), found[1]
         if about is None or self.place is None:
             return total, size
@@ -176,10 +177,10 @@ def _share(m: Mechanics) -> None:
 
 
 def samples(m: Mechanics, about: Vector | None = None) -> list[list[Acting | None]]:
-    """What each load exerts at random states (see ``Probe.acting``); None where that isn't known."""
+    """What each load exerts at random states (see ``Probe.exerted``); None where that isn't known."""
     key = "samples", None if about is None else tuple(about)
     if key not in m.made:
-        m.made[key] = [[probe.acting(load, about) for load in m.loads] for probe in Probe.several(m)]
+        m.made[key] = [[probe.exerted(load, about) for load in m.loads] for probe in Probe.several(m)]
     return m.made[key]
 
 
@@ -203,12 +204,13 @@ def spared(m: Mechanics, found: Sequence[Sequence[Acting | None]], axis: Vector)
 def spared_axis(m: Mechanics, found: Sequence[Sequence[Acting | None]]) -> Vector | None:
     """The unit axis in space about which loads exert nothing; None unless there is exactly one."""
     context = m.scene.context
-    if any(acting is None for sample in found for acting in sample):
+    known = [[acting for acting in sample if acting is not None] for sample in found]
+    if [len(sample) for sample in known] != [len(sample) for sample in found]:
         return None
-    sums = [[sum((acting[0][i] for acting in sample), context.zero) for i in range(3)] for sample in found]
+    sums = [[sum((acting[0][i] for acting in sample), context.zero) for i in range(3)] for sample in known]
     axis = max((cross(a, b) for a, b in combinations(sums, 2)), key=lambda x: norm(context, x))
     size, tiny = norm(context, axis), negligible(context)
-    if size <= tiny * max(sum(acting[1] for acting in sample) for sample in found) ** 2:
+    if size <= tiny * max(sum(acting[1] for acting in sample) for sample in known) ** 2:
         return None
     axis = [x / size if abs(x) > tiny * size else context.zero for x in axis]
     axis = [x / norm(context, axis) for x in axis]

@@ -87,7 +87,7 @@ class SampleBlock:
         return SampleBlock(first, *(column[which] for column in self._columns))
 
     @staticmethod
-    def joined(blocks: Sequence[SampleBlock]) -> SampleBlock:
+    def concatenated(blocks: Sequence[SampleBlock]) -> SampleBlock:
         """Join at least one block with those that follow it."""
         if len(blocks) == 1:
             return blocks[0]

@@ -224,7 +224,7 @@ class SampleBuffer:
             self._pieces.insert(0, (block.rows(inside, len(block)), boundary))
             pieces[-1] = block.rows(0, inside), boundary
         boundaries = {block.first: boundary for block, boundary in pieces}
-        return SampleBlock.joined([block for block, _ in pieces]), boundaries
+        return SampleBlock.concatenated([block for block, _ in pieces]), boundaries
 
     def took(self, work: str, rows: int, seconds: float) -> None:
         """Adapt how many samples may wait to what each kind of work gets done in the time of a chunk."""

@@ -192,9 +192,9 @@ class JoinedAngles:
         begins = [known.time, *times[:-1]]
         fast = np.flatnonzero(rates * (times - begins) > _DOUBTFUL)  # where the rates' bound is an estimate
         for row in {*self._doubtful(jumps, all_angles, sizes).tolist(), *fast.tolist()}:
-            place = (states[row - 1], int(block.chart[row - 1])) if row else (known.state, known.chart)
-            if place[0] is not None:
-                jumps[row] = self._looked_at(begins[row], *place, times[row], jumps[row], _DEPTH)
+            state, chart = (states[row - 1], int(block.chart[row - 1])) if row else (known.state, known.chart)
+            if state is not None:
+                jumps[row] = self._looked_at(begins[row], state, chart, times[row], jumps[row])
         made = np.rint((jumps - np.diff(all_angles, axis=0)) / _TURN).astype(np.int64)
         turns = known.turns + np.cumsum(made, axis=0)
         self.known = Continuity(turns[-1], angles[-1], times[-1], states[-1], int(block.chart[-1]))

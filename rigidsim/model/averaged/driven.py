@@ -153,8 +153,8 @@ def driven_by(
     axial = third * context.sqrt(1 + (1 - polhodes.ratio) * (second / third) ** 2) if third else third
     amplitude = math.atan2(float(second), float(first / polhodes.root)) if across != 0 else 0.0
     start = [float(context.ldexp(x, -exponent)) for x in (axial, across)]
-    wobble = torques.wobble(*start, amplitude)
-    change = torques.change(*start, wobble.amplitudes)
+    wobble = torques.wobble(start[0], start[1], amplitude)
+    change = torques.change(start[0], start[1], wobble.amplitudes)
     removed = wobble.removed(change, 0, float(np.abs(change).max())).real
     direction = np.zeros(3)
     if np.isfinite(removed).all():  # what isn't is refused below

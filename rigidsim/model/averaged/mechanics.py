@@ -180,8 +180,8 @@ class AveragedMechanics(Mechanics):
                 ellipse = source.ellipse(context, self.scene.start)
                 strength = source.of.gravitational_parameter / source.of.placement.distance(context)
                 size = 3 * strength * ellipse.motion / (2 * _LIGHT**2 * (1 - ellipse.square))
-                where = source.of.table is not None
-                seen = self.table(source.of.table) if where else self.orbit(self.carried(source.of.orbit))
+                table = source.of.table
+                seen = self.orbit(self.carried(source.of.orbit)) if table is None else self.table(table)
                 factor = as_factor(self.number(size * self.unit))
                 found.append([factor * x for x in seen.normal])
         return found

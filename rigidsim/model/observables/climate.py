@@ -95,6 +95,7 @@ def _bounded(x: Symbolic) -> Symbolic:
 
 def _insolation(m: Mechanics) -> list[Symbolic]:
     table, context = m.scene.config.output.insolation, m.scene.context
+    assert table is not None  # else the variable isn't found
     (c, s), (k, h) = _equinox(m), _eccentric(m)
     sine = hy.sqrt(c * c + s * s)  # of the obliquity
     solar, latitude = table.solar_longitude.at(context), table.latitude.at(context)

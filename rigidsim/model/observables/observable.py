@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import heyoka as hy
@@ -130,6 +131,10 @@ def _isotropic_damping(m: Mechanics) -> bool:
     return all(abs(d) <= total[k] * negligible(m.scene.context) for d in differences)
 
 
+def _keeps_axis(name: str, m: Mechanics) -> bool:
+    return m.attitude is not None and name in fixed_axes.kept_axes(m)
+
+
 NEEDS: dict[str, Need] = {
     "attitude": Need(lambda m: m.attitude is not None, lambda _: "attitude", _no_attitude),
     "flight": Need(lambda m: m.velocity is not None, lambda _: "flight", _NO_POSITION),
@@ -141,10 +146,7 @@ NEEDS: dict[str, Need] = {
     "jacobi": Need(lambda m: m.attitude is not None and rotating_orbit(m) is not None),
     "kovalevskaya": Need(lambda m: kovalevskaya_top(m) is not None),
     "goryachev_chaplygin": Need(lambda m: goryachev_chaplygin_top(m) is not None),
-    **{
-        f"{name}_axis": Need(lambda m, name=name: m.attitude is not None and name in fixed_axes.kept_axes(m))
-        for name in ("source", "field", *"xyz")
-    },
+    **{f"{name}_axis": Need(partial(_keeps_axis, name)) for name in ("source", "field", *"xyz")},
     "isotropic_damping": Need(lambda m: m.attitude is not None and _isotropic_damping(m)),
     "plane": Need(
         lambda m: not flies_in_plane(m.scene, m.loads) or m.velocity is not None,
