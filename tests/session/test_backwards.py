@@ -44,7 +44,7 @@ def test_the_same_motion_is_found_from_its_other_end(formulation: str) -> None:
     "name",
     cases(
         [path.stem for path in CONFIGS],
-        ["satellite_libration", "earth_precession_averaged", "moon_cassini_state", "pointing_with_wheels"],
+        ["satellite_libration", "earth_precession_averaged", "moon_cassini_state", "pointing_law"],
         daily=2,
     ),
 )
