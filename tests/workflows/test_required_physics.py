@@ -128,6 +128,7 @@ def test_the_written_config_runs_and_is_the_least_model(tmp_path: Path) -> None:
     run = rigidsim.run(made, out=None)
     apart = angles_between(attitudes(satellite()), [run.dataset["quaternion"].values])
     assert apart.max() * ARCSEC == pytest.approx(plan.least.largest_arcsec, rel=1e-6)
+    assert plan.least.expected_arcsec == pytest.approx(plan.least.largest_arcsec, rel=0.1)  # to first order
     with pytest.raises(rigidsim.RunFolderError, match="exists"):
         required(text, "1 deg", tmp_path, write=file)
     assert repr(plan).startswith("<Physics of 'satellite' within 3600 arcsec: leave out ")
