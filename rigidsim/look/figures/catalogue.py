@@ -263,7 +263,7 @@ def darkened(figure: Figure) -> None:
         if isinstance(color, str) and color != "none":  # else of a collection, coloured by a map
             other = _BRIGHT if isinstance(artist, Text) else color
             artist.set_color(hues.get(color, other))  # type: ignore[attr-defined]
-        for effect in artist.get_path_effects():  # the pale rim of letters on a light ground
+        for effect in artist.get_path_effects() or ():  # the pale rim of letters on a light ground
             getattr(effect, "_gc", {}).update(foreground=_DARK)
     for axes in figure.axes:
         axes.set_facecolor(_DARK)
