@@ -69,8 +69,8 @@ class Reversal:
         if self.position is not None:
             parts.append(f"position within {self.position:.2g} m")
         unit = "" if self.attitude is None else " rad"
-        told = "" if self.announced is None else f"; both ways announce {self.announced:.2g}{unit}"
-        return f"integrated to the end and back, it returns to its start: {', '.join(parts)}{told}"
+        announced = "" if self.announced is None else f"; both ways announce {self.announced:.2g}{unit}"
+        return f"integrated to the end and back, it returns to its start: {', '.join(parts)}{announced}"
 
 
 class _Ends(Collected):
