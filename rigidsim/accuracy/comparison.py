@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from typing import TYPE_CHECKING
 
 import mpmath
@@ -37,6 +37,27 @@ def distances_between(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) ->
 def _differences(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.ndarray:
     rows = np.stack([*one, *(-part for part in other)], axis=-1)
     return np.array([[math.fsum(parts) for parts in row] for row in rows]).reshape(one[0].shape)
+
+
+def rotation_vectors(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.ndarray:
+    """Rotation vectors (n, 3), rad, from the attitudes of one motion to those of another, in the body axes of
+    the first; of directions the smallest rotations, in space axes, that take one to the other.
+
+    Args:
+        one, other: float64 parts (n, 4) of quaternions, or (n, 3) of directions, which are subtracted before
+            anything is rounded.
+    """
+    first, turns, sign = one[0], 1.0, np.ones((len(one[0]), 1))
+    if first.shape[1] == 4:
+        turns, sign = 2.0, np.where(np.einsum("ij,ij->i", first, other[0]) < 0, -1.0, 1.0)[:, None]
+    pairs = zip_longest(one, other, fillvalue=np.zeros_like(first))
+    apart = np.sum([sign * b - a for a, b in pairs], axis=0)
+    sine = np.cross(first[:, -3:], apart[:, -3:])
+    if first.shape[1] == 4:  # vector part of conj(q) dq; that of conj(q) q is zero
+        sine = first[:, :1] * apart[:, 1:] - apart[:, :1] * first[:, 1:] - sine
+    size = np.linalg.norm(sine, axis=1)
+    angle = turns * np.arctan2(size, 1.0 + np.einsum("ij,ij->i", first, apart))
+    return np.asarray(sine * np.where(size > 0, angle / np.where(size > 0, size, 1.0), turns)[:, None])
 
 
 def spread_times(experiment: Experiment, count: int, until: float = 1.0) -> list[mpmath.mpf]:

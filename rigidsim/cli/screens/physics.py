@@ -5,7 +5,7 @@ from __future__ import annotations
 from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.cli.screens.words import arcsec_text
 from rigidsim.scene.readable import span_text
-from rigidsim.workflows.physics.table import ComparedModel, PhysicsPlan
+from rigidsim.workflows.physics.required import ComparedModel, PhysicsPlan
 
 _HEADS = ["left out", "largest", "rms", "operations", "steps", "", "what it is"]
 

@@ -7,14 +7,13 @@ from functools import cached_property
 import numpy as np
 import xarray
 
-from rigidsim.accuracy.comparison import parts_of
+from rigidsim.accuracy.comparison import parts_of, rotation_vectors
 from rigidsim.scene.row_rotations import angles_between, normalised
 from rigidsim.solve.from_states import FromStates, RowStates
 from rigidsim.workflows.compare import defects
 from rigidsim.workflows.compare.attitudes_alone import MOMENTS, STEADY, WindowsOfAttitudes
 from rigidsim.workflows.compare.columns import QUATERNION, Attitudes, size_of
 from rigidsim.workflows.compare.conventions import Convention
-from rigidsim.workflows.physics.models import rotation_vectors
 
 ABOVE = 5.0
 """Times what the digits of the file allow, from which on defects show something."""

@@ -2,38 +2,143 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
+import heyoka as hy
 import numpy as np
 
-from rigidsim.errors import ConfigError, Problem, Remedy
+from rigidsim.accuracy.choice import chosen
+from rigidsim.accuracy.comparison import parts_of, rotation_vectors
+from rigidsim.accuracy.modelling import Unmeasured, measure_modelling
+from rigidsim.errors import FORCE, OUT, ConfigError, Problem, Remedy, RunFolderError
+from rigidsim.model.load import loads_of
+from rigidsim.scene.choices import FULL, REDUCED
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import parse_number
 from rigidsim.scene.readable import span_text
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.tracing.numbers import plain
 from rigidsim.session.session import Tuning
-from rigidsim.solve.problem import prepare
+from rigidsim.solve.problem import InitialValueProblem, prepare
+from rigidsim.store.folder import RunFolder
 from rigidsim.store.outputs import refuse_inputs, refuse_loss, writing
-from rigidsim.workflows.physics.beyond import averaged_levels, geodetic
-from rigidsim.workflows.physics.effects import missing_from, outermost, without
-from rigidsim.workflows.physics.models import ModelRun, Models
-from rigidsim.workflows.physics.table import (
-    ARCSEC,
-    ComparedModel,
-    EffectWorth,
-    PhysicsPlan,
-    UnassessedEffect,
-)
+from rigidsim.store.run import SavedRun
+from rigidsim.store.summary import Summary
+from rigidsim.store.summary_parts import SummaryPart
+from rigidsim.workflows.physics.effects import effects_of, missing_from, outermost, without
 from rigidsim.workflows.read import Given, as_experiment
+from rigidsim.workflows.resume import resume
+from rigidsim.workflows.run import run
 
+ARCSEC = math.degrees(1.0) * 3600.0
+"""Arcseconds of a radian."""
 FIGURE = "ladder.png"
-_LONGEST = 94  # of a name that becomes the least model's
-_WHERE = Remedy("--physics", "error")
+_LONGEST, _LEAST = 80, 94  # letters of a run's name, and of one that becomes the least model's
 _UNCERTAIN = 0.1  # of the error, up to which rounding doesn't matter
+_LIGHT = 299792458.0  # m/s
+_ACCURACY = {f"integrator.{key}" for key in ("accuracy", "accuracy_axis", "accuracy_position")}
+_BESIDE = {f"output.{key}" for key in ("lyapunov", "sensitivity", "tip")}
+_FOR_FULL = {f"integrator.{key}" for key in ("accuracy", "method", "formulation", "hold_invariants")}
+"""Keys that an average may refuse, and that don't matter for what it errs by."""
+
+
+class MeasuredModel(SummaryPart):
+    """A model that was run.
+
+    Attributes:
+        rms_arcsec, largest_arcsec: angle between its attitudes and the full model's; of averages between the
+            axes.
+        operations: of its equations. cpu_seconds, steps: of its run, in the folder ``run``.
+    """
+
+    rms_arcsec: float
+    largest_arcsec: float
+    operations: int
+    steps: int
+    cpu_seconds: float
+    run: str
+
+
+class EffectWorth(MeasuredModel):
+    """What leaving out one effect does, over the span; ``required``: whether the least model has it."""
+
+    code: str
+    words: str
+    required: bool
+
+
+class UnassessedEffect(SummaryPart):
+    """An effect that wasn't assessed, and why."""
+
+    what: str
+    why: str
+
+
+class AveragedLevel(SummaryPart):
+    """A ``[model] level`` that averages, and the largest angle between its axes and the full model's."""
+
+    level: str
+    largest_arcsec: float
+
+
+class ComparedModel(MeasuredModel):
+    """A model that was run, against the full one.
+
+    Attributes:
+        left_out: codes of the effects that it doesn't have; of those with parts the whole alone.
+        expected_arcsec: largest angle of the sum of what its effects do one by one.
+        cost: steps times operations; of a closed form, which has no steps, the operations.
+        within: whether its largest angle is within the error.
+    """
+
+    left_out: list[str]
+    expected_arcsec: float
+    cost: int
+    within: bool
+
+
+class PhysicsPlan(SummaryPart):
+    """What each effect of a scene is worth, and the least model found within an error.
+
+    Attributes:
+        error_arcsec: the error asked for.
+        effects: the most worth first.
+        compared: the variable that angles are of: quaternion, or the axis of an average.
+        tried: the models that were run in search of the least one, which is the last.
+        uncertainty_arcsec: of the full model's attitude at the end by rounding; None if not estimated.
+        written: file of the least model's config; None if none was asked for.
+    """
+
+    name: str
+    error_arcsec: float
+    compared: str
+    span_s: float
+    samples: int
+    full: ComparedModel
+    least: ComparedModel
+    effects: list[EffectWorth]
+    averaged: list[AveragedLevel]
+    not_assessed: list[UnassessedEffect]
+    tried: list[ComparedModel]
+    uncertainty_arcsec: float | None
+    warnings: list[str]
+    folder: str
+    figure: str
+    written: str | None
+
+    def __repr__(self) -> str:
+        least = self.least
+        left_out = ", ".join(least.left_out) or "nothing"
+        rows = [f"  {x.code:24} {x.largest_arcsec:11.4g} arcsec" for x in self.effects]
+        first = f"<Physics of {self.name!r} within {self.error_arcsec:.4g} arcsec: leave out {left_out}, "
+        return "\n".join([f"{first}{least.largest_arcsec:.4g} arcsec", *rows]) + ">"
 
 
 def required_physics(
@@ -62,69 +167,67 @@ def required_physics(
         RunFolderError: a run didn't end, or a folder holds other runs.
     """
     experiment = as_experiment(experiment)
-    most = _asked(error)
-    if not isinstance(out, str | Path):
-        what = f"given {out!r}; a folder is allowed: the runs are kept there, so that they can go on"
-        raise ConfigError(Problem("out", what))
-    target = None if write is None else Path(write)
-    folder = Path(out) / f"{experiment.config.name}-physics"
+    most, config = _asked(error), experiment.config
+    folder = Path(out) / f"{config.name}-physics"
     refuse_inputs([folder], experiment.files)
-    if target is not None:
-        refuse_loss([target], experiment.files, force=force)
-    prepared = prepare(experiment)
-    models = Models(experiment, folder, force, tuning, told)
-    if not models.effects:
-        what = (
-            "has neither loads nor rotors, elasticity or a core, so that nothing can be left out: the body "
-        )
-        what += "rotates freely; plan without --physics shows what is integrated"
+    if write is not None:
+        refuse_loss([Path(write)], experiment.files, force=force)
+    scene, effects = prepare(experiment).scene, effects_of(config)
+    if not effects:
+        what = "has neither loads nor rotors, elasticity or a core, so that nothing can be left out: the "
+        what += "body rotates freely; plan without --physics shows what is integrated"
         raise ConfigError(Problem("config", what), experiment.source)
-    absent = [UnassessedEffect(what=what, why=why) for what, why in missing_from(experiment.config)]
-    full = models.run([])
-    alone: dict[str, ModelRun] = {}
-    for code, effect in models.effects.items():
+    absent = missing_from(config)
+    models = _Models(experiment, folder, force, tuning, told)
+    full, alone = models.run([]), dict[str, _ModelRun]()
+    for code, effect in effects.items():
         try:
             alone[code] = models.run([code])
         except ConfigError as problem:
             # without the names that are allowed: numbers of tables are those of the smaller config
             reasons = "; ".join(one.what.partition("; allowed: ")[0] for one in problem.problems)
-            why = f"can't be left out by itself: {reasons}"
-            absent.append(UnassessedEffect(what=f"{effect.words} ({code})", why=why))
+            absent.append((f"{effect.words} ({code})", f"can't be left out by itself: {reasons}"))
     if not alone:
         raise ConfigError(Problem("config", "no effect can be left out by itself; nothing to compare"))
-    averaged, why_not = averaged_levels(experiment)
-    beyond = geodetic(prepared.scene)
+    averaged, why_not = _averaged_levels(experiment)
+    absent += [*why_not, *_geodetic(scene)]
     tried = _tried(models, alone, most)
-    least, config = tried[-1], experiment.config
-    gone = {code for code in alone if {code, *models.effects[code].parts_of} & {*least.left_out}}
-    effects = [
+    least, doubt = tried[-1], None if full.uncertainty is None else full.uncertainty * ARCSEC
+    rows = [
         EffectWorth(
-            code=code, words=models.effects[code].words, required=code not in gone, **_measured(done)
+            code=code,
+            words=effects[code].words,
+            required=not {code, *effects[code].parts_of} & {*least.left_out},
+            **done.measured,
         )
         for code, done in alone.items()
-    ]  # fmt: skip
+    ]
+    warnings = []
+    if doubt is not None and doubt > _UNCERTAIN * most:
+        what = f"the full model's attitude is uncertain by {doubt:.1e} arcsec itself, by rounding: ask for a "
+        warnings.append(what + "larger error, or for more precision")
     result = PhysicsPlan(
         name=config.name,
-        error_arcsec=most * ARCSEC,
+        error_arcsec=most,
         compared=models.compared,
-        span_s=abs(float(prepared.scene.samples.last - prepared.scene.start)),
+        span_s=abs(float(scene.samples.last - scene.start)),
         samples=len(full.rotations),
-        full=_compared(full, [], 0.0, most),
+        full=full.compared([], 0.0, most),
         least=least,
-        effects=sorted(effects, key=lambda x: -x.largest_arcsec),
+        effects=sorted(rows, key=lambda row: -row.largest_arcsec),
         averaged=averaged,
-        not_assessed=[*absent, *why_not, *([beyond] if beyond else [])],
+        not_assessed=[UnassessedEffect(what=what, why=why) for what, why in absent],
         tried=tried,
-        uncertainty_arcsec=None if full.uncertainty is None else full.uncertainty * ARCSEC,
-        warnings=_warnings(full, most),
+        uncertainty_arcsec=doubt,
+        warnings=warnings,
         folder=str(folder),
         figure=str(folder / FIGURE),
-        written=None if target is None else str(target),
+        written=None if write is None else str(write),
     )
-    if target is not None:
-        made = least_config(experiment, least.left_out)
-        made = made.having([f'name="{config.name[:_LONGEST]}-least"'])  # beside the full one's run
-        with writing(target) as new:
+    if write is not None:
+        made = _recorded(without(experiment, least.left_out))
+        made = made.having([f'name="{config.name[:_LEAST]}-least"'])  # beside the full one's run
+        with writing(Path(write)) as new:
             new.write_text(_comments(result) + made.text, encoding="utf-8")
     from rigidsim.look.figures.ladder import save_ladder  # which loads matplotlib
 
@@ -133,16 +236,168 @@ def required_physics(
     return result
 
 
-def _tried(models: Models, alone: Mapping[str, ModelRun], most: float) -> list[ComparedModel]:
+def _asked(error: str | float | Decimal) -> float:
+    """The error, arcsec."""
+    try:
+        value = float(parse_number(error, "rad"))
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.pi:
+        what = f'given {error}; an angle such as "0.1 arcsec" is allowed, above 0 and below half a turn'
+        raise ConfigError(Problem(str(Remedy("--physics", "error")), what))
+    return value * ARCSEC
+
+
+# --- models as runs -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _ModelRun:
+    """A model that was run.
+
+    Attributes:
+        rotations: rotation vectors (n, 3), arcsec, from the full model's attitudes to its own.
+        uncertainty: of its own attitude at the end by rounding, rad; None if not estimated.
+        measured: the fields of a ``MeasuredModel``.
+    """
+
+    rotations: np.ndarray
+    uncertainty: float | None
+    measured: dict[str, Any]
+
+    @property
+    def largest(self) -> float:
+        """Largest angle from the full model, arcsec."""
+        return float(self.measured["largest_arcsec"])
+
+    def compared(self, codes: Sequence[str], expected: float, most: float) -> ComparedModel:
+        cost = max(self.measured["steps"], 1) * self.measured["operations"]
+        return ComparedModel(
+            left_out=[*codes], expected_arcsec=expected, cost=cost, within=self.largest <= most,
+            **self.measured,
+        )  # fmt: skip
+
+
+class _Models:
+    """The full model of an experiment and those without some of its effects, as runs in one folder, each of
+    which is found there, gone on with, or begun.
+
+    Attributes:
+        compared: the variable that is compared: the attitude, or the axis of an average, which keeps none.
+    """
+
+    def __init__(
+        self, given: Experiment, folder: Path, force: bool, tuning: Tuning | None, told: Callable[[str], None]
+    ) -> None:
+        self.effects, self.compared = effects_of(given.config), "quaternion"
+        self._folder, self._force, self._tuning, self._told = folder, force, tuning, told
+        self._done: dict[tuple[str, ...], _ModelRun] = {}
+        self._attitudes: list[np.ndarray] = []  # of the full model
+        if given.config.model.level in REDUCED:
+            self.compared = "figure_axis" if _recordable(given, "figure_axis") else "momentum_axis"
+        settings = _removed(given, _ACCURACY | _BESIDE)
+        settings += [f'output.record=["{self.compared}"]', "output.timeline=false"]
+        self._full = chosen(given)[0].having(settings)
+
+    def run(self, codes: Collection[str]) -> _ModelRun:
+        """The run without some effects.
+
+        Raises:
+            ConfigError: there is no such config. RunFolderError: the run didn't end, or another is there.
+        """
+        left_out = tuple(outermost(self.effects, codes))
+        if left_out not in self._done:
+            self._done[left_out] = self._run(left_out)
+        return self._done[left_out]
+
+    def _run(self, codes: tuple[str, ...]) -> _ModelRun:
+        name = "-".join(["without", *codes]) if codes else "full"
+        if len(name) > _LONGEST:
+            name = f"{name[: _LONGEST - 9]}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+        estimate = str(not codes).lower()
+        model = without(self._full, codes).having([f'name="{name}"', f"output.estimate={estimate}"])
+        done = self._saved(model)
+        summary = done.outcome
+        if not isinstance(summary, Summary) or summary.status != "finished":
+            raise RunFolderError(
+                f"{done.place}: ended as {done.status} ({summary.message or ''}), and models are compared "
+                "over the whole span; give it the time or steps that it needs, and call this again"
+            )
+        with done.dataset as dataset:
+            attitudes = parts_of(dataset, self.compared, np.arange(dataset.sizes["time"]))
+        self._attitudes = self._attitudes or attitudes
+        rotations = rotation_vectors(self._attitudes, attitudes) * ARCSEC
+        angles = np.linalg.norm(rotations, axis=1)
+        measured = {
+            "rms_arcsec": float(np.sqrt(np.mean(angles**2))),
+            "largest_arcsec": float(angles.max()),
+            "operations": size_of(prepare(model)),
+            "steps": summary.cost.steps,
+            "cpu_seconds": summary.cost.cpu_seconds,
+            "run": str(self._folder / name),
+        }
+        return _ModelRun(rotations, summary.accuracy.estimated_attitude_error, measured)
+
+    def _saved(self, model: Experiment) -> SavedRun:
+        """The run of a model, whatever of it there is already."""
+        folder = RunFolder(self._folder / model.config.name)
+        begun = folder.config.exists() and (folder.dataset.exists() or folder.segments.exists())
+        if begun and folder.config.read_text(encoding="utf-8") == model.text:
+            if not folder.dataset.exists():
+                self._told(f"{model.config.name}: goes on")
+            return resume(folder.path, tuning=self._tuning, progress=False)
+        if begun and not self._force:
+            raise RunFolderError(
+                f"{folder.path}: holds the run of another config; {FORCE} replaces it, another {OUT} puts "
+                "these runs elsewhere"
+            )
+        self._told(f"{model.config.name}: begun")
+        return run(model, out=self._folder, force=begun, tuning=self._tuning, progress=False)
+
+
+def size_of(prepared: InitialValueProblem) -> int:
+    """Operations of the compiled equations, each part counted once."""
+    equations = prepared.system.equations
+    function = hy.cfunc(
+        [right for _, right in equations],
+        [variable for variable, _ in equations],
+        compact_mode=True,
+        **prepared.precision.options,
+    )
+    return len(function.dc) - 2 * len(equations)
+
+
+def _removed(experiment: Experiment, keys: Collection[str]) -> list[str]:
+    """Settings that remove those of the keys that a config gives."""
+    given = {
+        f"{table}.{key}"
+        for table in ("output", "integrator")
+        for key in getattr(experiment.config, table).model_fields_set
+    }
+    return [f"{key}=" for key in sorted(given.intersection(keys))]
+
+
+def _recordable(experiment: Experiment, name: str) -> bool:
+    try:
+        prepare(experiment.having([f'output.record=["{name}"]']))
+    except ConfigError:
+        return False
+    return True
+
+
+# --- the least model ----------------------------------------------------------------------------------------
+
+
+def _tried(models: _Models, alone: dict[str, _ModelRun], most: float) -> list[ComparedModel]:
     """Models that were run in search of the least one, which is the last.
 
     Effects are left out from the least worth on, as long as the sum of what they do, as rotation vectors at
-    every sample, is within the error (rad). The model is run; while it is beyond the error, its effect worth
-    most is put back.
+    every sample, is within the error (arcsec). The model is run; while it is beyond the error, its effect
+    worth most is put back.
     """
 
     def summed(codes: Sequence[str]) -> float:
-        total = sum((alone[code].rotations for code in codes), np.zeros_like(models.run([]).rotations))
+        total = sum((alone[code].rotations for code in codes), np.zeros((1, 3)))
         return float(np.linalg.norm(total, axis=1).max())
 
     left_out: list[str] = []
@@ -155,77 +410,70 @@ def _tried(models: Models, alone: Mapping[str, ModelRun], most: float) -> list[C
     tried: list[ComparedModel] = []
     while not tried or not tried[-1].within:
         with suppress(ConfigError):  # a config that has no meaning without all of these
-            tried.append(_compared(models.run(left_out), left_out, summed(left_out), most))
+            tried.append(models.run(left_out).compared(left_out, summed(left_out), most))
         worst = max(left_out, key=lambda code: alone[code].largest, default="")
         left_out = [code for code in left_out if code != worst]
     return tried
 
 
-def least_config(experiment: Experiment, codes: Sequence[str]) -> Experiment:
-    """The experiment without some effects, and without asking to record what isn't there then."""
-    made = without(experiment, codes)
-    names = made.config.output.record or []
-    kept = [name for name in names if _recordable(made, name)]
-    return made if kept == names else made.having([f"output.record={kept}".replace("'", '"')])
-
-
-def _recordable(experiment: Experiment, name: str) -> bool:
-    try:
-        prepare(experiment.having([f'output.record=["{name}"]']))
-    except ConfigError:
-        return False
-    return True
-
-
-def _asked(error: str | float | Decimal) -> float:
-    """The error, rad."""
-    try:
-        value = float(parse_number(error, "rad"))
-    except ValueError as problem:
-        what = f'{problem}; an angle such as "0.1 arcsec" is allowed'
-        raise ConfigError(Problem(str(_WHERE), what)) from None
-    if not 0 < value < math.pi:
-        what = f'given {error}; an angle above 0 and below half a turn is allowed, such as "0.1 arcsec"'
-        raise ConfigError(Problem(str(_WHERE), what))
-    return value
-
-
-def _measured(done: ModelRun) -> dict[str, Any]:
-    return {
-        "rms_arcsec": done.rms * ARCSEC,
-        "largest_arcsec": done.largest * ARCSEC,
-        "operations": done.operations,
-        "steps": done.steps,
-        "cpu_seconds": done.cpu_seconds,
-        "run": str(done.folder),
-    }
-
-
-def _compared(done: ModelRun, codes: Sequence[str], expected: float, most: float) -> ComparedModel:
-    return ComparedModel(
-        left_out=list(codes), expected_arcsec=expected * ARCSEC, cost=done.cost, within=done.largest <= most,
-        **_measured(done),
-    )  # fmt: skip
+def _recorded(experiment: Experiment) -> Experiment:
+    """The experiment without asking to record what it doesn't have."""
+    names = experiment.config.output.record or []
+    kept = [name for name in names if _recordable(experiment, name)]
+    return experiment if kept == names else experiment.having([f"output.record={kept}".replace("'", '"')])
 
 
 def _comments(plan: PhysicsPlan) -> str:
     """What the least model leaves out, for the head of its config."""
-    what = (
-        f"The least model of {plan.name} within {plan.error_arcsec:.4g} arcsec over {span_text(plan.span_s)}"
-    )
-    lines = [f"{what} (rigidsim plan --physics): measured, it differs"]
-    lines.append(f"from the full one by {plan.least.largest_arcsec:.4g} arcsec at most.")
     rows = [row for row in plan.effects if not row.required]
-    lines.append("Left out, with what each is worth by itself:" if rows else "Nothing is left out.")
-    lines += [f"  {row.largest_arcsec:.4g} arcsec  {row.code}: {row.words}" for row in rows]
-    lines.append(
-        "What follows is the full model's config without these: its comments speak of the full model."
-    )
+    within = f"within {plan.error_arcsec:.4g} arcsec over {span_text(plan.span_s)}"
+    lines = [
+        f"The least model of {plan.name} {within} (rigidsim plan --physics): measured, it differs",
+        f"from the full one by {plan.least.largest_arcsec:.4g} arcsec at most.",
+        "Left out, with what each is worth by itself:" if rows else "Nothing is left out.",
+        *(f"  {row.largest_arcsec:.4g} arcsec  {row.code}: {row.words}" for row in rows),
+        "What follows is the full model's config without these: its comments speak of the full model.",
+    ]
     return "".join(f"# {line}\n" for line in lines) + "#\n"
 
 
-def _warnings(full: ModelRun, most: float) -> list[str]:
-    if full.uncertainty is None or full.uncertainty <= _UNCERTAIN * most:
-        return []
-    what = f"the full model's attitude is uncertain by {full.uncertainty * ARCSEC:.1e} arcsec itself, by "
-    return [what + "rounding: ask for a larger error, or for more precision"]
+# --- what no config is without, or has ----------------------------------------------------------------------
+
+
+def _averaged_levels(experiment: Experiment) -> tuple[list[AveragedLevel], list[tuple[str, str]]]:
+    """Each averaged model of a config, and what it errs by in the direction of axes; or why there is none.
+
+    It isn't among the models that are compared, since it keeps no attitude.
+    """
+    if experiment.config.model.level != FULL:
+        return [], [("averaging", "the config's own model is an average, whose error runs measure")]
+    found: list[AveragedLevel] = []
+    absent: dict[str, list[str]] = {}
+    plainer = _removed(experiment, {"output.record", *_FOR_FULL, *_BESIDE})
+    for level in REDUCED:
+        try:
+            averaged = prepare(experiment.having([f'model.level="{level}"', *plainer]))
+            worst = measure_modelling(averaged).worst
+            found.append(AveragedLevel(level=level, largest_arcsec=worst * ARCSEC))
+        except ConfigError as error:  # without what was given and what to choose: nobody chose it
+            whats = [problem.what.partition("; choose")[0] for problem in error.problems]
+            why = "; ".join(what.partition(", but ")[2] or what for what in whats)
+            absent.setdefault(why, []).append(level)
+        except Unmeasured as why_not:
+            absent.setdefault(str(why_not), []).append(level)
+    return found, [(f"averaging ({', '.join(levels)})", why) for why, levels in absent.items()]
+
+
+def _geodetic(scene: Scene) -> list[tuple[str, str]]:
+    """The geodetic precession, which no equations of ours have: how much it would be about the source by
+    which it is largest, 3/2 (G M)^(3/2) / (c^2 r^(5/2)). Nothing without such a source.
+    """
+    rates = [0.0]
+    for load in loads_of(scene):
+        if source := load.gradient_source:
+            distance = float(plain(source.placement.nearest(scene.context)))
+            strength = float(plain(source.gravitational_parameter))
+            rates.append(1.5 * strength**1.5 / (_LIGHT**2 * distance**2.5))
+    size = max(rates) * abs(float(scene.samples.last - scene.start)) * ARCSEC
+    why = f"the equations have none; a free axis would turn by some {size:.2g} arcsec over the span, one "
+    return [("geodetic precession", why + "locked to its orbit by none")] if size else []
