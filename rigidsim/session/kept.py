@@ -4,7 +4,7 @@ Everything here works on blocks of many members at once and on samples alone, wh
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -50,16 +50,17 @@ def kept_of_series(
     times: np.ndarray,
     lengths: np.ndarray,
     keep: Collection[str],
-    hidden: Collection[str] = (),
+    hidden: str = "",
 ) -> Kept:
     """What is asked for of recorded variables; drifts are always kept. Times in s are (samples,), or
-    (members, samples) if each has its own; ``lengths``: samples that each member has.
+    (members, samples) if each has its own; ``lengths``: samples that each member has; ``hidden``: what is
+    recorded only for indicators.
     """
     found: Kept = {}
     for one in series:
         if one.variable.name == GROWTH:
             found |= _indicators(one, times, keep)
-    series = [one for one in series if one.variable.name not in hidden]
+    series = [one for one in series if one.variable.name != hidden]
     for one in series:
         if one.drift_of is not None:
             found |= _drifts(one, lengths)
@@ -219,22 +220,17 @@ def _padded(rows: Sequence[np.ndarray], most: int, shape: tuple[int, ...]) -> np
     return table
 
 
-def joined(parts: Sequence[Kept], counts: Sequence[int]) -> Kept:
-    """Concatenate groups of members, with nan (0 for counts) where a group lacks a variable."""
-    names = dict.fromkeys(name for part in parts for name in part)
+def assembled(parts: Sequence[tuple[np.ndarray, Kept]], count: int) -> Kept:
+    """Groups of members, each at its places, as one; nan (0 for counts) where a group lacks a variable."""
     found: Kept = {}
-    for name in names:
-        like = next(part[name] for part in parts if name in part)
-        shapes = [part[name].values.shape[1:] for part in parts if name in part]
-        shape = tuple(max(sizes) for sizes in zip(*shapes, strict=True)) if shapes[0] else ()
-        whole = like.values.dtype.kind == "i"
-        table = np.full((sum(counts), *shape), 0 if whole else np.nan, dtype=like.values.dtype)
-        first = 0
-        for part, count in zip(parts, counts, strict=True):
-            if name in part:
-                values = part[name].values
-                place = (slice(first, first + count), *(slice(0, n) for n in values.shape[1:]))
-                table[place] = values
-            first += count
-        found[name] = KeptVariable(like.dims, table, like.attributes, like.item, like.labels)
+    for name in dict.fromkeys(name for _, part in parts for name in part):
+        held = [(places, part[name]) for places, part in parts if name in part]
+        like = held[0][1]
+        shape = np.max([one.values.shape[1:] for _, one in held], axis=0).astype(int)
+        lacking = 0 if like.values.dtype.kind == "i" else np.nan
+        table = np.full((count, *shape), lacking, dtype=like.values.dtype)
+        for places, one in held:
+            there: tuple[Any, ...] = (places, *(slice(0, size) for size in one.values.shape[1:]))
+            table[there] = one.values
+        found[name] = replace(like, values=table)
     return found

@@ -2,17 +2,16 @@
 
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from enum import Enum
-from itertools import accumulate
 
 import numpy as np
 
 from rigidsim.errors import ConfigError, RigidsimError
 from rigidsim.scene.cautions import WarningCode
-from rigidsim.session.kept import MemberSeries, joined, kept, kept_events, kept_of_series
+from rigidsim.session.kept import MemberSeries, assembled, kept, kept_events, kept_of_series
 from rigidsim.solve.status import Status
 from rigidsim.store.netcdf import joined_parts
 from rigidsim.store.run import MemoryRun
@@ -54,17 +53,14 @@ class MemberResults:
     estimating: float = 0.0
 
     @classmethod
-    def together(cls, parts: "Sequence[MemberResults]") -> "MemberResults":
-        """Several groups of members joined in order."""
-        counts = [len(part.kept["status"].values) for part in parts]
-        reasons: dict[int, str] = {}
+    def together(cls, parts: "Sequence[tuple[np.ndarray, MemberResults]]", why: str = "") -> "MemberResults":
+        """Groups of members as one, each with the places of its members."""
+        reasons = {int(places[row]): text for places, one in parts for row, text in one.reasons.items()}
         engines: Counter[str] = Counter()
-        for part, first in zip(parts, accumulate(counts, initial=0), strict=False):
-            reasons |= {first + place: why for place, why in part.reasons.items()}
-            engines.update(part.engines)
-        why = next((part.why_alone for part in parts if part.why_alone), "")
-        spent = sum(part.estimating for part in parts)
-        return cls(joined([part.kept for part in parts], counts), reasons, engines, why, spent)
+        for _, one in parts:
+            engines.update(one.engines)
+        kept = assembled([(places, one.kept) for places, one in parts], sum(len(p) for p, _ in parts))
+        return cls(kept, reasons, engines, why, sum(one.estimating for _, one in parts))
 
 
 def status_variable(codes: np.ndarray) -> KeptVariable:
@@ -145,7 +141,7 @@ def run_alone(
     most_events: int,
     events: Sequence[str],
     more: Callable[[MemoryRun], Kept] | None = None,
-    hidden: Collection[str] = (),
+    hidden: str = "",
 ) -> MemberResults:
     """Run one member by itself; a refusal or failure is recorded, and errors of the code are raised."""
     try:
@@ -196,7 +192,7 @@ def failed(outcome: Outcome, reason: str) -> MemberResults:
     return MemberResults(found, {0: reason}, {"alone": 1})
 
 
-def _kept_of_run(result: MemoryRun, keep: Sequence[str], hidden: Collection[str]) -> Kept:
+def _kept_of_run(result: MemoryRun, keep: Sequence[str], hidden: str) -> Kept:
     if not result.blocks:
         return {}
     series, times = [], np.zeros(0)

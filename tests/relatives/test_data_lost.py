@@ -20,7 +20,7 @@ READ = {"configs", "config", "dataset", "run_path", "run_paths", "file", "kernel
 """Parameters that name what is read."""
 SCENE = ["free.toml", "moments.csv"]
 RUN = [f"runs/free/{name}" for name in ("config.toml", "dataset.h5", "summary.json", "checkpoint.h5")]
-SWEEP = [f"runs/swept/{name}" for name in ("config.toml", "dataset.h5", "summary.json", "tiles/g000.json")]
+SWEEP = [f"runs/swept/{name}" for name in ("config.toml", "dataset.h5", "summary.json", "tiles/sweep.json")]
 FILES: list[tuple[str, dict[str, str], list[str]]] = [
     # a command, its options for files with the suffix that each wants, and what it reads
     ("compare free.toml theirs.csv", {"--out": ".h5", "--figure": ".png", "--timeline": ".rrd"},

@@ -21,8 +21,10 @@ import rigidsim
 from rigidsim import ConfigError, RunFolderError, open_sweep, parse
 from rigidsim import sweep as run_sweep
 from rigidsim.cli.app import app
+from rigidsim.errors import StoppedError
 from rigidsim.store.seal import seal
 from rigidsim.store.sweeps.folder import SweepFolder
+from rigidsim.store.sweeps.tiles import read_tile
 from rigidsim.workflows.sweeps.sweep import resume_sweep
 
 pytestmark = pytest.mark.optimised  # compared with runs of other processes
@@ -114,14 +116,16 @@ def test_members_are_single_runs_with_labels(folder: Path) -> None:
 def test_a_longer_axis_and_one_more_output_compute_only_what_is_new(tmp_path: Path) -> None:
     first = swept(tmp_path)
     tiles = SweepFolder(tmp_path / "box").tiles
-    before = {path.name: path.read_bytes() for path in tiles.iterdir()}
+    before = {path.name: path.read_bytes() for path in tiles.glob("*.h5")}
     final = first.dataset.angular_velocity_final.load()
     longer = SWEEP.replace("0.1, 3]", "0.1, 4]").replace('["final"]', '["final", "means"]')
     second = swept(tmp_path, CONFIG + longer)
     dataset = second.dataset
     assert {p.name: p.read_bytes() for p in tiles.iterdir() if p.name in before} == before
-    work = SweepFolder(tmp_path / "box").generations()[-1].works
-    assert [(w.keep, w.ranges) for w in work] == [(("final", "means"), ((6, 8),)), (("means",), ((0, 6),))]
+    new = [read_tile(path) for path in tiles.glob("*.h5") if path.name not in before]
+    assert sorted((one.items, len(one.keys)) for one in new) == [
+        (("always", "final", "means"), 2), *[(("means",), 2)] * 3
+    ]  # fmt: skip
     assert dataset.sizes["w3"] == 4
     np.testing.assert_array_equal(dataset.angular_velocity_final.values[:3], final.values)
     assert np.isfinite(dataset.angular_velocity_mean).all()
@@ -257,7 +261,7 @@ def _killed_sweep(tmp_path: Path, *options: str) -> SweepFolder:
     process = subprocess.Popen([*command, *options], stderr=subprocess.DEVNULL, start_new_session=True)
     deadline = time.monotonic() + 120
     while time.monotonic() < deadline and process.poll() is None:
-        if len(list(folder.tiles.glob("g000-*.h5"))) >= 1:
+        if len(list(folder.tiles.glob("*.h5"))) >= 1:
             break
         time.sleep(0.02)
     os.killpg(process.pid, signal.SIGKILL)
@@ -268,7 +272,7 @@ def _killed_sweep(tmp_path: Path, *options: str) -> SweepFolder:
 def test_a_killed_sweep_is_resumed_to_the_same_bits(folder: Path, tmp_path: Path) -> None:
     killed = _killed_sweep(tmp_path)
     assert not killed.summary.exists()
-    kept = {path.name: path.stat().st_mtime_ns for path in killed.tiles.glob("g000-*.h5")}
+    kept = {path.name: path.stat().st_mtime_ns for path in killed.tiles.glob("*.h5")}
     found = resume_sweep(killed.path)
     assert found.finished
     for name, modified in kept.items():  # nothing is computed twice
@@ -278,7 +282,7 @@ def test_a_killed_sweep_is_resumed_to_the_same_bits(folder: Path, tmp_path: Path
 
 
 @pytest.mark.slow  # three processes that import everything
-def test_workers_make_the_same_dataset_though_one_dies(folder: Path, tmp_path: Path) -> None:
+def test_workers_make_the_same_dataset_after_one_died(folder: Path, tmp_path: Path) -> None:
     from rigidsim.workflows.sweeps.sweep import SweepObserver
 
     class Killer(SweepObserver):
@@ -292,8 +296,12 @@ def test_workers_make_the_same_dataset_though_one_dies(folder: Path, tmp_path: P
 
     killer = Killer()
     text = CONFIG + SWEEP.replace("tile = 2", "tile = 1")
-    found = swept(tmp_path, text, workers=2, observer=killer)
+    with pytest.raises(StoppedError, match="worker process died"):
+        swept(tmp_path, text, workers=2, observer=killer)
+    kept = set((tmp_path / "box/tiles").glob("*.h5"))
+    assert kept
+    found = swept(tmp_path, text, workers=2)
     assert found.finished
-    assert killer.killed
+    assert kept < set(found.folder.tiles.glob("*.h5"))
     expected = open_sweep(folder).dataset.angular_velocity_final
     np.testing.assert_array_equal(found.dataset.angular_velocity_final.values, expected.values)

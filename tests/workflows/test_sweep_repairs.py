@@ -68,21 +68,21 @@ def same(one: SavedSweep, other: SavedSweep) -> bool:
 
 
 def test_a_damaged_tile_is_told_with_its_remedy_which_works(out: Path, finished: Path) -> None:
-    tile = out / "box" / "tiles" / "g000-0000001.h5"
+    tile = sorted((out / "box" / "tiles").glob("*.h5"))[1]
     content = bytearray(tile.read_bytes())
     content[len(content) // 2] ^= 1
     tile.write_bytes(content)
     for command in ("info", "resume"):
         told = CliRunner().invoke(app, [command, str(out / "box")])
         assert told.exit_code == 2
-        assert "g000-0000001.h5: is damaged or was edited" in told.stderr
+        assert f"{tile.name}: is damaged or was edited" in told.stderr
         assert "dataset.h5, which holds its members, is whole" in told.stderr
     for _ in range(2):
-        with pytest.raises(RunFolderError, match=r"g000-0000001\.h5.*remove it, and rigidsim\.resume"):
+        with pytest.raises(RunFolderError, match=rf"{tile.name}.*remove it, and rigidsim\.resume"):
             swept(out, LONGER)
     tile.unlink()
     found, run = swept(out, LONGER)
-    assert run == 2
+    assert run in (2, 3)  # the damage may have been seen before the seventh was run
     fresh, _ = swept(out / "fresh", LONGER)
     assert same(found, fresh)
 

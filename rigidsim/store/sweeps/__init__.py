@@ -1,1 +1,1 @@
-"""Files of a sweep: sealed tiles, generations, and the dataset gathered from them."""
+"""Files of a sweep: sealed tiles of members under their keys, and the dataset gathered from them."""

@@ -14,7 +14,8 @@ from rigidsim.store import atomic
 from rigidsim.store.atomic import sink
 from rigidsim.store.netcdf import NetcdfFile, writing
 from rigidsim.store.seal import seal
-from rigidsim.store.sweeps.sources import Described, Gathered, Sources, TileReader, plain
+from rigidsim.store.sweeps.sources import Described, Gathered, Sources
+from rigidsim.store.sweeps.tiles import plain
 from rigidsim.store.variables import LABELS, OF_THE_RUN
 
 _GZIP = 4
@@ -60,7 +61,6 @@ def write_dataset(
     path: Path,
     sweep: Sweep,
     sources: Sources,
-    reader: TileReader,
     found: Gathered,
     attributes: Mapping[str, Any],
 ) -> str:
@@ -71,9 +71,9 @@ def write_dataset(
             beside = _coordinates(file, sweep)
             created = _declared(file, sweep, found, beside)
             for name, (target_variable, described) in created.items():
-                item = next(item for item in sources.found if plain(item) == described.variable.item)
+                item = next(item for item in sources.places if plain(item) == described.variable.item)
                 for first, shape, flat in boxes(sweep.shape, math.prod(described.extra)):
-                    values = _values(name, described, item, sources, reader, flat)
+                    values = _values(name, described, item, sources, flat)
                     place = tuple(slice(i, i + n) for i, n in zip(first, shape, strict=True))
                     target_variable[place] = values.reshape(*shape, *described.extra)
             _write_reasons(file, found.reasons)
@@ -194,21 +194,14 @@ def boxes(
             yield first, shape, range(begin, begin + (high - low) * within)
 
 
-def _values(
-    name: str, described: Described, item: str, sources: Sources, reader: TileReader, flat: range
-) -> np.ndarray:
-    source = sources.found[item]
-    part = slice(flat.start, flat.stop)
-    keys, rows = source.tile[part], source.row[part]
-    values = np.full(
-        (len(keys), *described.extra), 0 if described.whole else np.nan,
-        dtype=np.int64 if described.whole else np.float64,
-    )  # fmt: skip
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(keys)) + 1, [len(keys)]])
+def _values(name: str, described: Described, item: str, sources: Sources, flat: range) -> np.ndarray:
+    places, part = sources.places[item], slice(flat.start, flat.stop)
+    tiles, rows = places.tile[part], places.row[part]
+    kind, lacking = (np.int64, 0) if described.whole else (np.float64, np.nan)
+    values = np.full((len(tiles), *described.extra), lacking, dtype=kind)
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(tiles)) + 1, [len(tiles)]])
     for low, high in pairwise(edges):
-        if keys[low] < 0:
-            continue
-        held = reader.tile(int(keys[low])).kept.get(name)
+        held = sources.tile(int(tiles[low])).kept.get(name)
         if held is not None:
             place = (slice(low, high), *(slice(0, n) for n in held.values.shape[1:]))
             values[place] = held.values[rows[low:high]]

@@ -1,24 +1,41 @@
 """The folder of a sweep: ``config.toml``, ``tiles/``, ``dataset.h5``, ``summary.json``."""
 
 import fcntl
+import hashlib
 import json
-import os
-import re
-import secrets
 import shutil
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field, TypeAdapter
 
-from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError
+from rigidsim.errors import FORCE, OUT, RunFolderError
 from rigidsim.store import atomic
 from rigidsim.store.folder import FileOf, WorkFolder
-from rigidsim.store.sweeps.tiles import Generation, Tile, read_tile
 
 KIND = "sweep"
-_GENERATION = re.compile(r"g(\d{3})\.json")
+
+
+@dataclass(frozen=True)
+class Begun:
+    """What a sweep was begun with.
+
+    Attributes:
+        members, tiles: that were to be computed for this config.
+        tile: members of a block of the sweep, of which a tile holds those that were missing.
+        alone: whether all members run one by one though some might share equations, as was found when the
+            first members were run; None if that wasn't asked.
+    """
+
+    config: str
+    config_sha256: str
+    members: int
+    tiles: int
+    tile: Annotated[int, Field(ge=1)]
+    alone: bool | None
 
 
 @dataclass(frozen=True)
@@ -31,7 +48,7 @@ class SweepFolder(WorkFolder):
     seen_by = fcntl.LOCK_EX
 
     tiles = FileOf("tiles")
-    """Folder of generations and their tiles."""
+    """Folder of the tiles, and of what they were begun with."""
     data = FileOf("data")
     """Folder with copies of the data of a sweep of fits."""
 
@@ -48,108 +65,61 @@ class SweepFolder(WorkFolder):
             return {}
         return content if isinstance(content, dict) else {}
 
-    def generations(self) -> list[Generation]:
-        """All of them, the oldest first; RunFolderError for a damaged one."""
-        if not self.tiles.is_dir():
-            return []
-        found = [(path, _GENERATION.fullmatch(path.name)) for path in sorted(self.tiles.iterdir())]
-        return [Generation.read(path, int(match[1])) for path, match in found if match]
+    @property
+    def note(self) -> Path:
+        """File of ``begun``; a session that begins to work on the sweep makes the file's time its own."""
+        return self.tiles / "sweep.json"
 
-    def finished_config(self) -> list[str]:
-        """The config of a finished sweep whose tiles may be gone, as far as it is there; empty if none is."""
-        if not self.dataset.exists():
-            return []
-        try:
-            return [self.config.read_text(encoding="utf-8")]
-        except (OSError, ValueError):
-            return [""]  # that of no sweep
+    @property
+    def begun(self) -> Begun | None:
+        """What the sweep was begun with; None if it wasn't, or if its tiles were deleted.
 
-    def add(self, generation: Generation, *, exclusive: bool = False) -> Generation:
-        """Write a generation, whose tiles may then be computed, and return the one that is stored: with
-        ``exclusive`` other processes may write the same one at the same time, and the first counts.
+        Raises:
+            RunFolderError: it is damaged, or of a version whose tiles aren't read; a finished one opens.
         """
-        self.tiles.mkdir(parents=True, exist_ok=True)
-        path = self.generation_file(generation)
-        if exclusive:
-            mine = self.tiles / f".{path.name}.{secrets.token_hex(8)}.{os.getpid()}.partial"
-            mine.write_text(generation.as_text(), encoding="utf-8")
-            try:
-                os.link(mine, path)
-            except FileExistsError:
-                return Generation.read(path, generation.number)
-            finally:
-                mine.unlink(missing_ok=True)
-        else:
-            atomic.write_bytes(path, generation.as_text().encode())
-        atomic.write_bytes(self.config, generation.config.encode())
-        return generation
-
-    def generation_file(self, generation: Generation) -> Path:
-        """Path of a generation; a session that begins to work on it makes the time of its file its own."""
-        return self.tiles / f"g{generation.number:03d}.json"
-
-    def tile(self, generation: Generation, tile: int) -> Path:
-        """Path of a tile."""
-        return self.tiles / f"g{generation.number:03d}-{tile:07d}.h5"
-
-    def present(self, generation: Generation) -> np.ndarray:
-        """Which tiles of a generation exist, (tiles,) bool."""
-        there = np.zeros(generation.tiles, dtype=bool)
-        pattern = re.compile(rf"g{generation.number:03d}-(\d{{7}})\.h5")
-        if self.tiles.is_dir():
-            for entry in os.scandir(self.tiles):
-                match = pattern.fullmatch(entry.name)
-                if match and int(match[1]) < len(there):
-                    there[int(match[1])] = True
-        return there
-
-    def read(self, generation: Generation, tile: int) -> Tile:
-        """Read and check a tile; RunFolderError if it is damaged, or isn't the one that belongs there."""
-        path = self.tile(generation, tile)
-        again = f"remove it, and {RESUME} computes it again"
         try:
-            found = read_tile(path, generation.config_sha256)
-        except RunFolderError as error:
-            raise RunFolderError(f"{error}; {again}") from None
-        if not np.array_equal(found.members, generation.members_of(tile)):
-            raise RunFolderError(f"{path}: holds other members than belong there; {again}")
-        return found
+            return TypeAdapter(Begun).validate_json(self.note.read_bytes())
+        except FileNotFoundError:
+            if not any(self.tiles.glob("g*.json")) or self.dataset.exists():
+                return None
+            why = "begun by a version of rigidsim that this one can't go on with"
+        except (OSError, ValueError) as error:
+            why = f"damaged ({str(error).splitlines()[0]})"
+        raise RunFolderError(f"{self.note}: is {why}; {FORCE} runs all members again")
 
-    def save(self, generation: Generation, tile: int, image: bytes) -> None:
-        """Write a tile; on return it is saved."""
-        atomic.write_bytes(self.tile(generation, tile), image)
+    def begin(self, begun: Begun) -> None:
+        """Write what is begun with. Several processes that share a sweep write the same."""
+        self.tiles.mkdir(parents=True, exist_ok=True)
+        atomic.write_bytes(self.note, json.dumps(asdict(begun)).encode())
+        atomic.write_bytes(self.config, begun.config.encode())
 
-    def begin(self, *, force: bool) -> None:
+    def tile_files(self, config_sha256: str = "") -> list[Path]:
+        """The tiles there are, or those that were computed for a config."""
+        return sorted(self.tiles.glob(f"t{config_sha256[:8]}*.h5"))
+
+    def tile_file(self, config_sha256: str, block: int, keys: np.ndarray, items: Sequence[str]) -> Path:
+        """Where the tile with these members of a block is saved."""
+        content = hashlib.sha256(keys.tobytes() + " ".join(items).encode()).hexdigest()
+        return self.tiles / f"t{config_sha256[:8]}-{block:07d}-{content[:8]}.h5"
+
+    def claim(self, *, force: bool) -> None:
         """Make the folder ready; RunFolderError if it holds something else, or can't be written."""
         ours = ["config.toml", "tiles", "data", "dataset.h5", "summary.json"]
         try:
             present = self.content([*ours, *(path.name for path in self.path.glob("figure*"))])
-            self.path.mkdir(parents=True, exist_ok=True)
             if not (self.is_sweep or force or all(name.startswith(".") for name in present)):
                 raise RunFolderError(f"{self.path}: holds a run; {FORCE} replaces it, another {OUT} or name "
                                      "puts the sweep elsewhere")  # fmt: skip
-            if force:
-                for path in (self.summary, self.dataset, self.config):
-                    path.unlink(missing_ok=True)
-                for folder in (self.tiles, self.data):
-                    if folder.exists():
-                        shutil.rmtree(folder)
-            self.remove_torn()
+            for path in (self.summary, self.dataset, self.config) if force else ():
+                path.unlink(missing_ok=True)
+            for folder in (self.tiles, self.data) if force else ():
+                shutil.rmtree(folder, ignore_errors=True)
+            for folder in (self.path, self.tiles, self.data):
+                for path in folder.glob(".*.partial"):  # of a process that was killed on this machine
+                    if not Path(f"/proc/{path.name.split('.')[-2]}").exists():
+                        path.unlink(missing_ok=True)
         except OSError as error:
             raise self.unwritable(error) from None
-
-    def remove_torn(self) -> None:
-        """Delete partial files that killed processes were writing."""
-        for folder in (self.path, self.tiles, self.data):
-            for path in folder.glob(".*.partial"):
-                if not _alive(path):
-                    path.unlink(missing_ok=True)
-
-
-def _alive(partial: Path) -> bool:
-    """Whether the process that writes a temporary file is still running (on this machine)."""
-    number = partial.name.split(".")[-2]
-    return number.isdigit() and Path(f"/proc/{number}").exists()
 
 
 def is_sweep(path: str | Path) -> bool:

@@ -1,19 +1,19 @@
 """Sweeps on disk: the dataset, read lazily, and the summary."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from pydantic import Field, ValidationError
 
 from rigidsim.errors import RESUME, RunFolderError
 from rigidsim.store.seal import check_seal, refuse_damaged
 from rigidsim.store.summary_parts import SummaryPart, first_of
 from rigidsim.store.sweeps.folder import SweepFolder
-from rigidsim.store.sweeps.tiles import Generation
+from rigidsim.store.sweeps.tiles import read_tile
 
 if TYPE_CHECKING:
     import xarray
@@ -149,7 +149,7 @@ class SavedSweep:
         """Check the files of a complete sweep against their seals, which reads all of them."""
         if self.folder.dataset.exists():
             self._refuse_damaged_dataset()
-        for path in sorted(self.folder.tiles.glob("g*.h5")):
+        for path in sorted(self.folder.tiles.glob("*.h5")):
             try:
                 check_seal(path)
             except RunFolderError as error:
@@ -191,44 +191,33 @@ def _so_far(folder: SweepFolder) -> SweepSummary:
     except ValidationError as error:
         why = first_of(error)
         raise RunFolderError(f"{folder.summary}: is damaged or no summary of rigidsim ({why})") from None
-    generations = folder.generations()
-    if not generations:
+    begun = folder.begun
+    if begun is None or (summary.status == "finished" and summary.config_sha256 == begun.config_sha256):
         return summary
-    latest = generations[-1]
-    present = folder.present(latest)
-    ended = summary.config_sha256 == latest.config_sha256
-    if ended and bool(present.all()):
-        return summary
+    files = folder.tile_files(begun.config_sha256)
+    done = min(sum(len(read_tile(path, whole=False).keys) for path in files), begun.members)
     busy = folder.at_work
-    done = int(sum(len(latest.members_of(int(t))) for t in np.flatnonzero(present)))
-    status = "running" if busy else (summary.status if ended and summary.status else "interrupted")
     words = "a process is at work on it" if busy else "the tiles that are complete are kept"
-    rate = _rate(folder, latest) if busy else None
-    left = latest.members - done
+    rate = _rate(folder, files, begun.tile) if busy else None
     return SweepSummary(
         kind="sweep",
         name=folder.path.name,
-        status=status,
-        message=f"{done:,} of {latest.members:,} members to be run are done; {words}",
+        status="running" if busy else "interrupted",
+        message=f"{done:,} of {begun.members:,} members to be run are done; {words}",
         exit_code=0 if busy else 130,
-        members=latest.members,
+        members=begun.members,
         members_done=done,
-        tiles=latest.tiles,
-        tiles_done=int(present.sum()),
+        tiles=begun.tiles,
+        tiles_done=len(files),
         members_per_second=rate,
-        seconds_left=left / rate if rate else None,
-        config_sha256=latest.config_sha256,
+        seconds_left=(begun.members - done) / rate if rate else None,
+        config_sha256=begun.config_sha256,
     )
 
 
-def _rate(folder: SweepFolder, generation: Generation) -> float | None:
-    """Members per second of the session that is at work, from the times at which its latest tiles were
-    written.
-    """
-    begun = folder.generation_file(generation).stat().st_mtime
-    written = (path.stat().st_mtime for path in folder.tiles.glob(f"g{generation.number:03d}-*.h5"))
-    times = sorted([begun, *(when for when in written if when > begun)])[-_RECENT:]
-    if len(times) < 2:
-        return None
+def _rate(folder: SweepFolder, files: Sequence[Path], members: int) -> float | None:
+    """Members per second of the session that is at work, by the times of its latest tiles."""
+    begun = folder.note.stat().st_mtime
+    times = sorted([begun, *(when for path in files if (when := path.stat().st_mtime) > begun)])[-_RECENT:]
     span = max(time.time(), times[-1]) - times[0]
-    return generation.length * (len(times) - 1) / span if span > 0 else None
+    return members * (len(times) - 1) / span if len(times) > 1 and span > 0 else None

@@ -1,10 +1,10 @@
-"""Where each kept item of each member of a sweep is found, over all of its generations, and what the tiles
-there hold: variables, their sizes, and times.
+"""Where each kept item of each member of a sweep is found, and what the tiles there hold: variables, their
+sizes, and times.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -12,137 +12,17 @@ import numpy as np
 from rigidsim.errors import RESUME, RunFolderError
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.store.sweeps.folder import SweepFolder
-from rigidsim.store.sweeps.tiles import ALWAYS, Generation, KeptVariable, Tile, Work, ranges_of
+from rigidsim.store.sweeps.tiles import ALWAYS, KeptVariable, Tile, items_of, keys_of, plain, read_tile
 
-_NOWHERE = -1
 _TILES_IN_MEMORY = 96
 
 
-def items_of(sweep: Sweep) -> tuple[str, ...]:
-    """Items kept of a sweep's members, by the names under which they are known (the number of events kept is
-    part of it).
-    """
-    counted = {name: f"{name}:{sweep.table.most_events}" for name in ("events", "section")}
-    return tuple(counted.get(name, name) for name in sweep.table.keep)
-
-
-def plain(item: str) -> str:
-    """The item's name in ``[sweep] keep``."""
-    return item.partition(":")[0]
-
-
 @dataclass(frozen=True)
-class ItemPlaces:
-    """Where each member's item is found, (members,): ``key_of`` its tile, and place in the tile; -1 if
-    nowhere.
-    """
+class Places:
+    """Where each member's item is found, (members,) each: number of the tile, row there; -1 if nowhere."""
 
     tile: np.ndarray
     row: np.ndarray
-
-    @property
-    def missing(self) -> np.ndarray:
-        """Mask of the members that lack the item."""
-        return self.tile == _NOWHERE
-
-
-def key_of(generation: int, tile: Any) -> Any:
-    """One number for a tile of a generation, or an array of them for several."""
-    return generation << 32 | tile
-
-
-def tile_of(key: int) -> tuple[int, int]:
-    """Generation and number of a tile."""
-    return key >> 32, key & 0xFFFFFFFF
-
-
-@dataclass(frozen=True)
-class Sources:
-    """Where everything kept of a sweep's members is found, by item, including ``ALWAYS``."""
-
-    found: dict[str, ItemPlaces] = field(default_factory=dict)
-
-    @property
-    def missing(self) -> np.ndarray:
-        """Members that lack any item, ascending."""
-        return np.flatnonzero(np.logical_or.reduce([source.missing for source in self.found.values()]))
-
-    def works(self) -> tuple[Work, ...]:
-        """What is still to be computed; members that lack the same items go together."""
-        missing = [source.missing.astype(np.int64) for source in self.found.values()]
-        pattern = np.sum([lacks << bit for bit, lacks in enumerate(missing)], axis=0)
-        works = []
-        for value in sorted(set(np.unique(pattern).tolist()) - {0}, reverse=True):
-            keep = tuple(item for bit, item in enumerate(self.found) if value >> bit & 1 and item != ALWAYS)
-            works.append(Work(keep, ranges_of(np.flatnonzero(pattern == value))))
-        return tuple(works)
-
-
-def sources_of(
-    sweep: Sweep,
-    folder: SweepFolder,
-    generations: Sequence[tuple[Generation, Sweep]],
-    to_come: Generation | None = None,
-) -> Sources:
-    """Find all that a sweep asks for in its folder's generations, or ``to_come``; the oldest counts."""
-    found = {
-        item: ItemPlaces(
-            np.full(sweep.count, _NOWHERE, dtype=np.int64), np.full(sweep.count, _NOWHERE, dtype=np.int32)
-        )
-        for item in (ALWAYS, *items_of(sweep))
-    }
-    for generation, then in generations:
-        old = positions(sweep, then)
-        present = folder.present(generation)
-        if to_come is not None and generation.number == to_come.number:
-            present[:] = True
-        before = 0
-        for work, count in zip(generation.works, generation.tile_counts, strict=True):
-            places = work.places(old)
-            tiles = np.where(places >= 0, before + places // generation.length, 0)
-            there = (places >= 0) & present[tiles] if len(present) else np.zeros(len(old), dtype=bool)
-            for item, source in found.items():
-                if item == ALWAYS or item in work.keep:
-                    new = there & source.missing
-                    source.tile[new] = key_of(generation.number, tiles[new])
-                    source.row[new] = places[new] % generation.length
-            before += count
-    return Sources(found)
-
-
-def positions(sweep: Sweep, then: Sweep) -> np.ndarray:
-    """Index, in another sweep, of each member of a sweep; -1 if it isn't there."""
-    if _same_axes(sweep, then):
-        return np.arange(sweep.count)
-    keys, old_keys = [axis.key for axis in sweep.axes], [axis.key for axis in then.axes]
-    if sorted(keys) != sorted(old_keys):
-        return np.full(sweep.count, _NOWHERE)
-    order = [old_keys.index(key) for key in keys]  # the other's axes in the order of this one's
-    if sweep.product and then.product:
-        strides = np.array([int(np.prod(then.shape[i + 1 :])) for i in range(len(then.axes))], dtype=np.int64)
-        flat = np.zeros(sweep.shape, dtype=np.int64)
-        absent = np.zeros(sweep.shape, dtype=bool)
-        for place, number in enumerate(order):
-            known = {then.axes[number].values.text(i): i for i in range(then.axes[number].values.count)}
-            values = sweep.axes[place].values
-            index = np.array([known.get(values.text(i), _NOWHERE) for i in range(values.count)])
-            index = index.reshape([-1 if i == place else 1 for i in range(len(keys))])
-            absent |= index == _NOWHERE
-            flat += np.where(index == _NOWHERE, 0, index) * strides[number]
-        return np.where(absent, _NOWHERE, flat).reshape(-1)
-    known_members: dict[tuple[str, ...], int] = {}
-    for member in range(then.count):
-        texts = then.texts(member)
-        known_members.setdefault(tuple(texts[number] for number in order), member)
-    return np.array([known_members.get(sweep.texts(m), _NOWHERE) for m in range(sweep.count)], dtype=np.int64)
-
-
-def _same_axes(sweep: Sweep, then: Sweep) -> bool:
-    return (
-        sweep.table.axes == then.table.axes
-        and list(sweep.table.axes) == list(then.table.axes)
-        and (sweep.table.mode, sweep.table.seed) == (then.table.mode, then.table.seed)
-    )
 
 
 @dataclass
@@ -166,58 +46,88 @@ class Gathered:
     made: list[Mapping[str, Any]] = field(default_factory=list)
 
 
-class TileReader:
-    """Reads tiles of a folder and keeps the latest in memory."""
+class Sources:
+    """The tiles of a folder, as they were when this was made, for a sweep's members."""
 
-    def __init__(self, folder: SweepFolder, generations: Sequence[Generation]) -> None:
-        self._folder = folder
-        self._generations = {generation.number: generation for generation in generations}
+    def __init__(self, sweep: Sweep, folder: SweepFolder) -> None:
+        self.keys, self._items, self._place = keys_of(sweep), items_of(sweep), folder.path
+        self._files = folder.tile_files()
         self.tile = lru_cache(_TILES_IN_MEMORY)(self._read)
 
-    @property
-    def place(self) -> str:
-        """Path of the sweep's folder."""
-        return str(self._folder.path)
+    def _read(self, number: int) -> Tile:
+        return read_tile(self._files[number])
 
-    def _read(self, key: int) -> Tile:
-        """A tile, by its ``key_of``; RunFolderError if it is damaged."""
-        generation, number = tile_of(key)
-        return self._folder.read(self._generations[generation], number)
+    @cached_property
+    def places(self) -> dict[str, Places]:
+        """Where everything kept is found, by item."""
+        heads = [read_tile(path, whole=False) for path in self._files]
+        return {item: self._find(item, heads) for item in self._items}
 
+    def _find(self, item: str, heads: Sequence[Tile]) -> Places:
+        numbers = [number for number, one in enumerate(heads) if item in one.items]
+        lengths = [len(heads[number].keys) for number in numbers]
+        if not sum(lengths):
+            nowhere = np.full(len(self.keys), -1)
+            return Places(nowhere, nowhere)
+        known = np.concatenate([heads[number].keys for number in numbers])
+        order = np.argsort(known, kind="stable")  # the oldest comes first
+        at = order[np.minimum(np.searchsorted(known, self.keys, sorter=order), len(known) - 1)]
+        there = known[at] == self.keys
+        rows = np.concatenate([np.arange(length) for length in lengths])
+        tiles = np.repeat(numbers, lengths)
+        return Places(np.where(there, tiles[at], -1), np.where(there, rows[at], -1))
 
-def gather(sources: Sources, reader: TileReader) -> Gathered:
-    """Read once every tile that is used; RunFolderError if one is gone, damaged, or disagrees with others."""
-    found = Gathered()
-    if len(sources.missing):
-        gone = len(sources.missing)
-        raise RunFolderError(f"{reader.place}: tiles of {gone:,} members are gone; {RESUME} computes them")
-    common: np.ndarray | None = None
-    alike = True
-    always = sources.found[ALWAYS]
-    for key, wanted in _tiles(sources).items():
-        tile = reader.tile(key)
-        found.made.append(tile.made)
-        for name, variable in tile.kept.items():
-            if variable.item not in wanted:
-                continue
-            values = variable.values
-            known = found.variables.get(name)
-            if known is None:
-                whole = values.dtype.kind == "i"
-                found.variables[name] = Described(variable, whole, values.shape[1:])
-            elif known.variable.dims != variable.dims:
-                raise RunFolderError(f"{reader.place}: tiles disagree about {name}")
-            else:
-                known.extra = tuple(map(max, known.extra, values.shape[1:]))
-        if "time" in tile.kept and tile.kept["time"].values.size and "series" in wanted and alike:
-            common, alike = _common(common, tile.kept["time"].values)
-        if tile.reasons:
-            for member in np.flatnonzero(always.tile == key):
-                why = tile.reasons.get(int(always.row[member]))
-                if why is not None:
-                    found.reasons[int(member)] = why
-    found.times = common if alike else None
-    return found
+    @cached_property
+    def missing(self) -> np.ndarray:
+        """Mask of the members that lack any item."""
+        return np.logical_or.reduce([places.tile < 0 for places in self.places.values()])
+
+    def wanted(self, block: range) -> tuple[np.ndarray, tuple[str, ...]]:
+        """Of a block of members those to be computed, one for each key, and the items that any lacks."""
+        some = block.start + np.flatnonzero(self.missing[block.start : block.stop])
+        _, first = np.unique(self.keys[some], return_index=True)
+        items = [item for item, places in self.places.items() if (places.tile[some] < 0).any()]
+        return some[np.sort(first)], tuple(items)
+
+    def parts(self) -> Iterator[tuple[Tile, np.ndarray, np.ndarray]]:
+        """All tiles in which members are found, with these and their rows there."""
+        always = self.places[ALWAYS]
+        order = np.argsort(always.tile, kind="stable")
+        for group in np.split(order, np.flatnonzero(np.diff(always.tile[order])) + 1):
+            yield self.tile(int(always.tile[group[0]])), group, always.row[group]
+
+    def gather(self) -> Gathered:
+        """Read once every tile that is used; RunFolderError if one is gone, damaged, or disagrees with
+        others.
+        """
+        if gone := int(self.missing.sum()):
+            raise RunFolderError(f"{self._place}: tiles of {gone:,} members are gone; {RESUME} computes them")
+        found = Gathered()
+        common: np.ndarray | None = None
+        alike = True
+        wanted = {item: set(np.unique(places.tile).tolist()) for item, places in self.places.items()}
+        for number in sorted(set().union(*wanted.values())):
+            tile = self.tile(number)
+            found.made.append(tile.made)
+            items = {plain(item) for item, numbers in wanted.items() if number in numbers}
+            for name, variable in tile.kept.items():
+                if variable.item in items:
+                    self._describe(found.variables, name, variable)
+            if "series" in items and alike and "time" in tile.kept and tile.kept["time"].values.size:
+                common, alike = _common(common, tile.kept["time"].values)
+        found.times = common if alike else None
+        for tile, members, rows in self.parts():
+            for member, row in zip(members.tolist(), rows.tolist(), strict=True) if tile.reasons else ():
+                if row in tile.reasons:
+                    found.reasons[member] = tile.reasons[row]
+        return found
+
+    def _describe(self, known: dict[str, Described], name: str, variable: KeptVariable) -> None:
+        sizes = variable.values.shape[1:]
+        one = known.setdefault(name, Described(variable, variable.values.dtype.kind == "i", sizes))
+        if one.variable.dims != variable.dims:
+            raise RunFolderError(f"{self._place}: tiles disagree about {name}")
+        one.extra = tuple(map(max, one.extra, sizes))
 
 
 def _common(known: np.ndarray | None, rows: np.ndarray) -> tuple[np.ndarray | None, bool]:
@@ -229,12 +139,3 @@ def _common(known: np.ndarray | None, rows: np.ndarray) -> tuple[np.ndarray | No
     width = min(rows.shape[1], len(known))
     agree = np.isnan(rows[:, :width]) | (rows[:, :width] == known[:width])
     return known, bool(agree.all()) and np.array_equal(known[: len(longest)], longest)
-
-
-def _tiles(sources: Sources) -> dict[int, set[str]]:
-    """All tiles in which something is found, with the items found there, in order."""
-    found: dict[int, set[str]] = {}
-    for item, source in sources.found.items():
-        for key in np.unique(source.tile[~source.missing]).tolist():
-            found.setdefault(key, set()).add(plain(item))
-    return dict(sorted(found.items()))

@@ -1,139 +1,89 @@
-"""Generations of a sweep: a config together with the members that were missing when it was given, in tiles.
+"""Tiles of a sweep: results of some members under their keys; sealed, written once, read with distrust.
 
-A sweep begins with one generation; a longer axis or one more output adds another, whose tiles hold only what
-was new. A tile holds the results of some members: sealed, written once, and read with distrust.
+A member's key is a number made of the experiment that all members share and of the name and value of each
+axis. So a tile holds its members whatever sweep they belong to by now: what is missing of a sweep are the
+wanted keys without those that are present.
 """
 
 import hashlib
 import io
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import h5py
 import numpy as np
-from pydantic import Field, TypeAdapter, ValidationError
 
-from rigidsim.errors import FORCE, RunFolderError
+from rigidsim.errors import RESUME, RunFolderError
+from rigidsim.scene.sweep_table import RANDOM, AxisTable
+from rigidsim.scene.sweeps.axes import Axis
+from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.toml_text import apply_overrides, parse_toml
 from rigidsim.store.netcdf import writing
 from rigidsim.store.seal import check_seal, refuse_special, sealed
-from rigidsim.store.summary_parts import first_of
 
-_FORMAT = 1
+_FORMAT = 2
 ALWAYS = "always"
 """The item that is kept for every member, asked for or not."""
 
 
-@dataclass(frozen=True)
-class Work:
-    """Members, by ranges [first, stop), ascending, for which the same items are to be computed."""
-
-    keep: tuple[str, ...]
-    ranges: tuple[tuple[int, int], ...]
-
-    @property
-    def count(self) -> int:
-        """Number of members."""
-        return sum(stop - first for first, stop in self.ranges)
-
-    def members(self, first: int, stop: int) -> np.ndarray:
-        """The members at places first ... stop-1 in this work."""
-        found, before = [np.zeros(0, dtype=np.int64)], 0
-        for begin, end in self.ranges:
-            low, high = max(first - before, 0), min(stop - before, end - begin)
-            if low < high:
-                found.append(np.arange(begin + low, begin + high))
-            before += end - begin
-        return np.concatenate(found)
-
-    def places(self, members: np.ndarray) -> np.ndarray:
-        """Places of the given members in this work; -1 for one that isn't in it."""
-        begins = np.array([first for first, _ in self.ranges], dtype=np.int64)
-        sizes = np.array([stop - first for first, stop in self.ranges], dtype=np.int64)
-        before = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-        which = np.searchsorted(begins, members, side="right") - 1
-        offset = members - begins[which]
-        inside = (which >= 0) & (members >= 0) & (offset < sizes[which])
-        return np.where(inside, before[which] + offset, -1)
+# --- keys ---------------------------------------------------------------------------------------------------
 
 
-def ranges_of(members: np.ndarray) -> tuple[tuple[int, int], ...]:
-    """Ascending members as ranges [first, stop)."""
-    if not len(members):
-        return ()
-    breaks = np.flatnonzero(np.diff(members) != 1)
-    firsts = members[np.concatenate([[0], breaks + 1])]
-    lasts = members[np.concatenate([breaks, [len(members) - 1]])]
-    return tuple((int(a), int(b) + 1) for a, b in zip(firsts, lasts, strict=True))
+def identity(sweep: Sweep) -> str:
+    """What members share: the config without swept values and without values that no number depends on."""
+    tables = parse_toml(sweep.experiment.text, sweep.experiment.source)
+    alone = not tables.get("sweep", {}).get("batch", True)
+    for key in ("name", "description", "sweep"):
+        tables.pop(key, None)
+    for key in ("timeline", "timeline_rows"):
+        tables.get("output", {}).pop(key, None)
+    if not tables.get("output", True):
+        del tables["output"]
+    keys = sorted(axis.key for axis in sweep.axes)
+    apply_overrides(tables, [f'{key}="swept"' for key in keys])
+    return json.dumps([keys, tables, *(["alone"] if alone else [])], sort_keys=True, default=str)
 
 
-@dataclass(frozen=True)
-class Generation:
-    """A config's text with the works that were to be done for it; tiles of ``length`` members are numbered
-    through them. ``apart``: whether all members run one by one though some might share equations, as was
-    found when the sweep was begun; None if that wasn't asked.
+def keys_of(sweep: Sweep) -> np.ndarray:
+    """Key of each member, (members,) int64: the sum of a random number for each axis and value, modulo 2^64.
+    1e6 members share one by a chance of 3e-8.
     """
+    keys = np.array(_hash(identity(sweep)))
+    for axis, table in zip(sweep.axes, sweep.table.axes.values(), strict=True):
+        numbers = _numbers(axis, table, sweep.table.seed)
+        keys = np.add.outer(keys, numbers) if sweep.product else keys + numbers
+    return keys.reshape(-1)
 
-    number: int
-    config: str
-    length: Annotated[int, Field(ge=1)]
-    works: tuple[Work, ...]
-    apart: bool | None = None
 
-    @property
-    def config_sha256(self) -> str:
-        """SHA-256 of the TOML text."""
-        return hashlib.sha256(self.config.encode()).hexdigest()
+def _numbers(axis: Axis, table: AxisTable, seed: int) -> np.ndarray:
+    count = axis.values.count
+    if table.way in RANDOM:  # values that take long to draw, and that seed, key and index decide
+        drawn = repr((axis.key, table.way, getattr(table, table.way), table.grid, seed))
+        return np.random.Philox(key=int(_hash(drawn)) % 2**64).random_raw(count).view(np.int64)
+    return np.array([_hash(f"{axis.key}={axis.values.text(i)}") for i in range(count)])
 
-    @cached_property
-    def tile_counts(self) -> tuple[int, ...]:
-        """Number of tiles in each work."""
-        return tuple(-(-work.count // self.length) for work in self.works)
 
-    @property
-    def tiles(self) -> int:
-        """Number of tiles."""
-        return sum(self.tile_counts)
+def _hash(text: str) -> np.int64:
+    return np.frombuffer(hashlib.blake2b(text.encode(), digest_size=8).digest(), "<i8")[0]
 
-    @property
-    def members(self) -> int:
-        """Number of members to be run."""
-        return sum(work.count for work in self.works)
 
-    def work_of(self, tile: int) -> tuple[Work, int]:
-        """The work that a tile belongs to, and the tile's number within it."""
-        for work, count in zip(self.works, self.tile_counts, strict=True):
-            if tile < count:
-                return work, tile
-            tile -= count
-        raise IndexError(tile)
+def items_of(sweep: Sweep) -> tuple[str, ...]:
+    """Items kept of a sweep's members, by the names under which they are known (the number of events kept is
+    part of it).
+    """
+    counted = {name: f"{name}:{sweep.table.most_events}" for name in ("events", "section")}
+    return (ALWAYS, *(counted.get(name, name) for name in sweep.table.keep))
 
-    def members_of(self, tile: int) -> np.ndarray:
-        """The members of a tile."""
-        work, number = self.work_of(tile)
-        return work.members(number * self.length, (number + 1) * self.length)
 
-    def as_text(self) -> str:
-        """JSON text for ``gNNN.json``."""
-        return json.dumps({"format": _FORMAT, **asdict(self)}) + "\n"
+def plain(item: str) -> str:
+    """The item's name in ``[sweep] keep``."""
+    return item.partition(":")[0]
 
-    @classmethod
-    def read(cls, path: Path, number: int) -> "Generation":
-        """Read a ``gNNN.json``; RunFolderError if it is damaged."""
-        try:
-            content = json.loads(path.read_text(encoding="utf-8"))
-            if content["format"] != _FORMAT:
-                raise ValueError("another format")
-            return TypeAdapter(cls).validate_python({**content, "number": number})
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            why = first_of(error) if isinstance(error, ValidationError) else error
-            raise RunFolderError(
-                f"{path}: is damaged or of another version ({why}); a finished sweep does without tiles/, "
-                f"{FORCE} runs another one again"
-            ) from None
+
+# --- files --------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -156,12 +106,12 @@ Kept = dict[str, KeptVariable]
 
 @dataclass(frozen=True)
 class Tile:
-    """Results of some members of a config, whose indices are (n,) int64; by place in it, why they failed;
+    """Results of some members, whose keys are (n,) int64: their items; by place in it, why they failed;
     engines, versions, seconds, ...: everything that differs between repetitions.
     """
 
-    config_sha256: str
-    members: np.ndarray
+    keys: np.ndarray
+    items: tuple[str, ...]
     kept: Kept
     reasons: Mapping[int, str] = field(default_factory=dict)
     made: Mapping[str, Any] = field(default_factory=dict)
@@ -179,41 +129,43 @@ class Tile:
                 {
                     "source": "rigidsim",
                     "tile_format": _FORMAT,
-                    "config_sha256": self.config_sha256,
+                    "items": " ".join(self.items),
                     "variables": json.dumps(described),
                     "reasons": json.dumps({str(place): why for place, why in self.reasons.items()}),
                     "made": json.dumps(dict(self.made)),
                 }
             )
-            file.group("tile", {"members": self.members.astype(np.int64)})
+            file.group("tile", {"keys": self.keys})
             file.group("kept", {name: v.values for name, v in self.kept.items()})
         return bytes(sealed(buffer))
 
 
-def read_tile(path: Path, config_sha256: str) -> Tile:
-    """Read a tile; RunFolderError if it is torn, damaged, foreign, or of another config."""
-    refuse_special(path)
-    check_seal(path)
+def read_tile(path: Path, *, whole: bool = True) -> Tile:
+    """Read a tile and check its seal; without ``whole`` keys and items alone, unchecked.
+
+    Raises:
+        RunFolderError: it is torn, damaged or foreign.
+    """
+    kept: Kept = {}
+    again = f"remove it, and {RESUME} computes it again"
     try:
+        refuse_special(path)
+        if whole:
+            check_seal(path)
         with h5py.File(path, "r") as file:
-            if int(file.attrs.get("tile_format", [0])[0]) != _FORMAT:
-                raise RunFolderError(f"{path}: is no tile that this version of rigidsim reads")
-            members, held = np.asarray(file["tile"]["members"][()]), file["kept"]
-            kept: Kept = {}
+            if int(file.attrs["tile_format"][0]) != _FORMAT:
+                raise ValueError("of another version")
+            keys, items = np.asarray(file["tile"]["keys"][()]), tuple(str(file.attrs["items"]).split())
+            if not whole:
+                return Tile(keys, items, kept)
             for name, v in json.loads(file.attrs["variables"]).items():
-                empty = np.zeros((len(members), *(0 for _ in v["dims"])))
-                values = np.asarray(held[name][()]) if name in held else empty
+                empty = np.zeros((len(keys), *(0 for _ in v["dims"])))
+                values = np.asarray(file["kept"][name][()]) if name in file["kept"] else empty
                 labels = v.get("labels", {})
                 kept[name] = KeptVariable(tuple(v["dims"]), values, v["attributes"], v["item"], labels)
-            tile = Tile(
-                str(file.attrs["config_sha256"]),
-                members,
-                kept,
-                {int(place): str(why) for place, why in json.loads(file.attrs["reasons"]).items()},
-                json.loads(file.attrs["made"]),
-            )
+            reasons = {int(place): str(why) for place, why in json.loads(file.attrs["reasons"]).items()}
+            return Tile(keys, items, kept, reasons, json.loads(file.attrs["made"]))
+    except RunFolderError as error:
+        raise RunFolderError(f"{error}; {again}") from None
     except (OSError, KeyError, ValueError, TypeError, IndexError) as error:
-        raise RunFolderError(f"{path}: can't be read as a tile ({error})") from None
-    if tile.config_sha256 != config_sha256:
-        raise RunFolderError(f"{path}: belongs to another sweep")
-    return tile
+        raise RunFolderError(f"{path}: can't be read as a tile ({error}); {again}") from None

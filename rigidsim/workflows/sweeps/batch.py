@@ -37,8 +37,7 @@ from rigidsim.solve.batch.family import (
 )
 from rigidsim.solve.batch.run import BatchBlock, BatchRun
 from rigidsim.solve.problem import prepare
-from rigidsim.solve.status import Status
-from rigidsim.store.sweeps.tiles import Kept, KeptVariable
+from rigidsim.store.sweeps.tiles import Kept
 from rigidsim.store.variables import Variable
 
 _ONE_BY_ONE = ("frequencies",)
@@ -52,17 +51,8 @@ _MOST_UNTRACED = 8
 """Members that can't be traced after which a check leaves the others to their runs: each takes as long."""
 
 
-@dataclass
-class Batched:
-    """Results of a tile's members that were run in batches, or that no run accepts, with their places; places
-    of those still to be run one by one, and why the first of them is left; CPU seconds of error estimates.
-    """
-
-    results: list[MemberResults]
-    members: list[np.ndarray]
-    left: list[int]
-    why: str
-    estimating: float = 0.0
+Part = tuple[np.ndarray, MemberResults]
+"""Results of some of a tile's members, with their places among them."""
 
 
 def why_alone(sweep: Sweep, keep: Sequence[str]) -> str:
@@ -96,17 +86,16 @@ class _FamilyRun:
 
 
 class BatchTiles:
-    """Families of a sweep, traced and compiled once per process; some variables are only for indicators."""
+    """Families of a sweep, traced and compiled once per process."""
 
-    def __init__(self, sweep: Sweep, hidden: Sequence[str]) -> None:
+    def __init__(self, sweep: Sweep) -> None:
         self._sweep = sweep
-        self._hidden = hidden
         self.axes = AxisNumbers(sweep)
         self._known: list[Family] = []
         self._runs: dict[int, _FamilyRun] = {}
 
     @cached_property
-    def apart(self) -> NotBatchable | None:
+    def alone(self) -> NotBatchable | None:
         """Why all members run one by one, if too few could share a batch; None if they don't.
 
         It is judged by the config alone: who runs in a batch must not depend on which members a process has
@@ -149,7 +138,7 @@ class BatchTiles:
 
     def compile(self) -> None:
         """Trace and compile what members from all over the sweep need."""
-        if self.apart is not None:
+        if self.alone is not None:
             return
         some, found = self._sample
         for family, numbers in found.groups[:_MOST_AHEAD]:
@@ -158,32 +147,43 @@ class BatchTiles:
             if self._estimated:
                 compiled.estimates.compile()
 
-    def run(self, members: Sequence[int], keep: Sequence[str], apart: bool | None = None) -> Batched:
-        """Run all members that can be run together; none if they were found to run ``apart`` before."""
-        if apart or (apart is None and self.apart is not None):
-            why = self.apart or NotBatchable.FAMILIES
-            return Batched([], [], list(range(len(members))), why.name.lower())
+    def run(
+        self, members: Sequence[int], keep: Sequence[str], alone: bool | None = None
+    ) -> tuple[list[Part], list[int], str]:
+        """Run all members that can be run together; none if they were found to run ``alone`` before.
+
+        Returns:
+            Results of these, and of members that no run accepts; places of those still to be run one by one;
+            and the code of the reason why the first of them is left.
+        """
+        if alone or (alone is None and self.alone is not None):
+            return [], list(range(len(members))), (self.alone or NotBatchable.FAMILIES).name.lower()
         found = self._sorted(members)
-        done = Batched([], [], sorted(found.alone), "")
-        if found.alone:
-            done.why = found.alone[done.left[0]].name.lower()
+        left = sorted(found.alone)
+        why = found.alone[left[0]].name.lower() if left else ""
+        parts: list[Part] = []
         for place, error in found.refused.items():
             reason = "; ".join(str(problem) for problem in error.problems)
-            done.results.append(failed(Outcome.REFUSED, reason))
-            done.members.append(np.array([place]))
+            parts.append((np.array([place]), failed(Outcome.REFUSED, reason)))
         for family, numbers in found.groups:
             compiled = self._run_of(family, int(members[int(numbers.members[0])]))
             for block in compiled.run.blocks(numbers):
                 before = time.process_time()
                 errors = compiled.estimates.of(numbers, block) if self._estimated else None
-                done.estimating += time.process_time() - before
-                self._take(block, errors, compiled.variables, keep, done)
-        done.left.sort()
-        return done
+                spent = time.process_time() - before
+                done = np.array([status is not None for status in block.status], dtype=bool)
+                if done.any():
+                    parts.append(
+                        (block.members[done], self._results(compiled, block, errors, done, keep, spent))
+                    )
+                if not done.all():
+                    left += block.members[~done].tolist()
+                    why = why or "gave_up"
+        return parts, sorted(left), why
 
     def refused(self, members: Sequence[int], most: int | None = None) -> tuple[dict[int, ConfigError], int]:
         """Members that no run accepts, up to ``most``, why, and how many share equations and can be run."""
-        if self.apart is not None:
+        if self.alone is not None:
             return {}, 0
         found = self._sorted(members, most, _MOST_UNTRACED)
         accepted = sum(len(numbers.members) for _, numbers in found.groups)
@@ -200,19 +200,15 @@ class BatchTiles:
     def _estimated(self) -> bool:
         return self._sweep.base.config.output.estimate
 
-    def _take(
-        self,
-        block: BatchBlock,
-        errors: MemberErrors | None,
-        variables: Sequence[Variable],
-        keep: Sequence[str],
-        done: Batched,
-    ) -> None:
-        gave_up = np.array([status is None for status in block.status], dtype=bool)
-        kept = _kept(block, variables, keep, self._sweep.table.most_events, self._hidden)
-        statuses = block.status.copy()
-        statuses[gave_up] = Status.NON_FINITE
-        kept["status"] = status_variable(_outcome_codes(statuses))
+    def _results(
+        self, compiled: _FamilyRun, block: BatchBlock, errors: MemberErrors | None, done: np.ndarray,
+        keep: Sequence[str], estimating: float,
+    ) -> MemberResults:  # fmt: skip
+        """Results of those members of a block that are ``done``."""
+        sweep = self._sweep
+        kept = _kept(block, compiled.variables, keep, sweep.table.most_events, sweep.added)
+        codes = [-1 if status is None else OUTCOMES.index(status.value) for status in block.status]
+        kept["status"] = status_variable(np.array(codes, dtype=np.int64))
         over = block.largest_drifts().max(axis=0) > block.drift_bound
         warned = {WarningCode.DRIFT: over, WarningCode.UNDEFINED: _lost(block)}
         if errors is not None:
@@ -221,25 +217,18 @@ class BatchTiles:
         bits = [np.where(found, warning_bits([code.value]), 0) for code, found in warned.items()]
         kept["warnings"] = warnings_variable(np.bitwise_or.reduce(bits))
         rows = np.maximum(block.reached - 1, 0)
-        reached = np.where(block.reached > 0, block.times[rows], np.nan)
         kept |= plain_variables(
             steps=block.steps,
-            reached=reached,
+            reached=np.where(block.reached > 0, block.times[rows], np.nan),
             bound=block.drift_bound,
             attitude_error=None if errors is None else errors.attitude,
             position_error=None if errors is None else errors.position,
         )
-        chosen = np.flatnonzero(~gave_up)
-        done.left += block.members[gave_up].tolist()
-        if len(chosen) < len(statuses):
-            done.why = done.why or "gave_up"
-            kept, statuses = rows_of(kept, chosen), statuses[chosen]
-        badly = ~np.isin(kept["status"].values, [OUTCOMES.index(name) for name in ENDED_WELL])
-        reasons = {place: statuses[place].message for place in np.flatnonzero(badly).tolist()}
-        if len(chosen):
-            engines = {f"batch of {block.width}": len(chosen)}
-            done.results.append(MemberResults(kept, reasons, engines))
-            done.members.append(block.members[chosen])
+        kept = {name: replace(v, values=v.values[done]) for name, v in kept.items()}
+        statuses = [status for status in block.status if status is not None]
+        reasons = {i: one.message for i, one in enumerate(statuses) if one.value not in ENDED_WELL}
+        engines = {f"batch of {block.width}": len(statuses)}
+        return MemberResults(kept, reasons, engines, estimating=estimating)
 
 
 def _lost(block: BatchBlock) -> np.ndarray:
@@ -256,34 +245,12 @@ def _lost(block: BatchBlock) -> np.ndarray:
     return found
 
 
-def _outcome_codes(statuses: np.ndarray) -> np.ndarray:
-    codes = np.zeros(len(statuses), dtype=np.int64)
-    for status in Status:
-        if status.value in OUTCOMES:
-            codes[statuses == status] = OUTCOMES.index(status.value)
-    return codes
-
-
-def rows_of(kept: Kept, rows: np.ndarray) -> Kept:
-    """Kept variables of the given members, in the given order."""
-    return {name: KeptVariable(v.dims, v.values[rows], v.attributes, v.item) for name, v in kept.items()}
-
-
-def in_order(parts: Sequence[MemberResults], members: Sequence[np.ndarray]) -> MemberResults:
-    """Groups of a tile's members joined, each member at its place (``members``: the places of each)."""
-    places = np.concatenate(members)
-    whole = MemberResults.together(parts)
-    order = np.argsort(places, kind="stable")
-    reasons = {int(places[row]): why for row, why in whole.reasons.items()}
-    return replace(whole, kept=rows_of(whole.kept, order), reasons=reasons)
-
-
 def _kept(
     block: BatchBlock,
     variables: Sequence[Variable],
     keep: Sequence[str],
     most_events: int,
-    hidden: Sequence[str],
+    hidden: str,
 ) -> Kept:
     series, recorded = [], {}
     for variable in variables:
@@ -296,7 +263,7 @@ def _kept(
             continue
         series.append(MemberSeries(variable, [values]))
     kept = kept_of_series(series, block.times, block.reached, keep, hidden)
-    recorded = {name: variable for name, variable in recorded.items() if name not in hidden}
+    recorded = {name: variable for name, variable in recorded.items() if name != hidden}
     for event in block.events:
         edges = np.searchsorted(event.member, np.arange(len(block.members) + 1))
         times = [event.time[a:b] for a, b in pairwise(edges)]

@@ -134,9 +134,9 @@ class _Missing(RunFolderError):
 def fit_members(sweep: Sweep, members: Sequence[int], folder: Path) -> MemberResults:
     """Fit some members, by the copies of their data."""
     found = []
-    for member in members:
+    for place, member in enumerate(members):
         with naming_member(member):
-            found.append(_fit_member(sweep, member, folder))
+            found.append((np.array([place]), _fit_member(sweep, member, folder)))
     return MemberResults.together(found)
 
 

@@ -21,12 +21,11 @@ from rigidsim.session.members import MemberResults, naming_member, run_alone
 from rigidsim.solve.problem import prepare
 from rigidsim.store import provenance
 from rigidsim.store.run import MemoryRun
-from rigidsim.store.sweeps.sources import plain
-from rigidsim.store.sweeps.tiles import Kept, KeptVariable, Tile
+from rigidsim.store.sweeps.tiles import Kept, KeptVariable, Tile, plain
 from rigidsim.workflows.analyse import analyse
 from rigidsim.workflows.read import parse, reads_kernels, refuse_others
 from rigidsim.workflows.run import run
-from rigidsim.workflows.sweeps.batch import Batched, BatchTiles, in_order, why_alone
+from rigidsim.workflows.sweeps.batch import BatchTiles, Part, why_alone
 
 _MOST_TRIED = 1000  # members among which there has to be one that can be run
 _LINES = 5  # of each signal's spectrum
@@ -90,21 +89,17 @@ def recording(sweep: Sweep) -> Sweep:
     return replace(sweep, base=sweep.base.having([f"output.record=[{names}]"]), added=GROWTH)
 
 
-def hidden_of(sweep: Sweep) -> tuple[str, ...]:
-    """Variables recorded only for indicators."""
-    asked = sweep.experiment.config.output.record
-    return () if asked is not None and GROWTH in asked else (GROWTH,)
-
-
 def tile_image(
-    config: str, source: str, members: Sequence[int], keep: Sequence[str], apart: bool | None, data: str = ""
-) -> bytes:
+    config: str, source: str, members: np.ndarray, keys: np.ndarray, items: tuple[str, ...],
+    alone: bool | None, data: str,
+) -> bytes:  # fmt: skip
     """Run members of a sweep's config and keep items (``items_of``): the sealed file of their tile; ``data``:
     the folder of what members are fitted to.
     """
     began, cpu = time.perf_counter(), time.process_time()
-    sweep = sweep_of(config, source)
-    results = run_members(sweep, members, [plain(item) for item in keep], apart, Path(data))
+    results = run_members(
+        sweep_of(config, source), members.tolist(), [plain(item) for item in items], alone, Path(data)
+    )
     made = {
         "engines": dict(results.engines),
         "why_alone": results.why_alone,
@@ -116,23 +111,17 @@ def tile_image(
         **{f"version_{name}": version for name, version in provenance.versions().items()},
         **kernel_of_members(config, source),
     }
-    return Tile(
-        sweep.experiment.sha256,
-        np.array(members, dtype=np.int64),
-        results.kept,
-        results.reasons,
-        made,
-    ).image()
+    return Tile(keys, items, results.kept, results.reasons, made).image()
 
 
 def run_members(
     sweep: Sweep,
     members: Sequence[int],
     keep: Sequence[str],
-    apart: bool | None = None,
+    alone: bool | None = None,
     data: Path | None = None,
 ) -> MemberResults:
-    """Run some members of a sweep and keep the items asked for; ``apart``: see ``Generation``; ``data``: the
+    """Run some members of a sweep and keep the items asked for; ``alone``: see ``Begun``; ``data``: the
     folder of what they are fitted to, if they are.
     """
     if sweep.fits:
@@ -141,26 +130,26 @@ def run_members(
         assert data is not None
         return fit_members(sweep, members, data)
     events = [event.name for event in sweep.base.config.events]
-    most = sweep.table.most_events
     more = frequencies_of if "frequencies" in keep else None
-    hidden = hidden_of(sweep)
-    done = Batched([], [], list(range(len(members))), why_alone(sweep, keep))
-    if not done.why:
-        done = batches_of(sweep.experiment.text, sweep.experiment.source).run(members, keep, apart)
-    for place in done.left:
+    parts: list[Part] = []
+    left, why = list(range(len(members))), why_alone(sweep, keep)
+    if not why:
+        parts, left, why = batches_of(sweep.experiment.text, sweep.experiment.source).run(
+            members, keep, alone
+        )
+    for place in left:
         member = partial(lambda member: run(sweep.experiment_of(member), out=None), members[place])
         with naming_member(members[place]):
-            done.results.append(run_alone(member, keep, most, events, more, hidden))
-        done.members.append(np.array([place]))
-    whole = in_order(done.results, done.members)
-    return replace(whole, why_alone=done.why, estimating=done.estimating + whole.estimating)
+            found = run_alone(member, keep, sweep.table.most_events, events, more, sweep.added)
+        parts.append((np.array([place]), found))
+    return MemberResults.together(parts, why)
 
 
 @lru_cache(maxsize=4)
 def batches_of(config: str, source: str) -> BatchTiles:
     """The families of a config's sweep, traced once per process."""
     sweep = sweep_of(config, source)
-    return BatchTiles(sweep, hidden_of(sweep))
+    return BatchTiles(sweep)
 
 
 def get_ready(config: str, source: str) -> None:

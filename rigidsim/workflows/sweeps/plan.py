@@ -199,7 +199,7 @@ def _member_seconds(sweep: Sweep, made: RunPlan) -> float:
         return fit.starts * _RUNS_OF_A_FIT * seconds + max(predicted.building_seconds, _BUILD_SECONDS)
     if (
         why_alone(sweep, sweep.table.keep)
-        or batches_of(sweep.experiment.text, sweep.experiment.source).apart is not None
+        or batches_of(sweep.experiment.text, sweep.experiment.source).alone is not None
     ):
         beside = predicted.choosing_seconds + predicted.modelling_seconds
         return seconds + max(predicted.building_seconds, _BUILD_SECONDS) + beside

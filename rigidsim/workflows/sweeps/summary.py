@@ -1,12 +1,14 @@
 """Summary of all members of a sweep: how they ended, warnings, errors, and the cost."""
 
+from collections import Counter
+
 import numpy as np
 
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.members import ENDED_WELL, OUTCOMES, WARNINGS
 from rigidsim.store.sweeps.run import ErrorsOfMembers, SweepCost, SweepSummary
-from rigidsim.store.sweeps.sources import Gathered, Sources, TileReader
-from rigidsim.store.sweeps.tiles import ALWAYS, Kept
+from rigidsim.store.sweeps.sources import Gathered, Sources
+from rigidsim.store.sweeps.tiles import Kept
 from rigidsim.workflows.sweeps.fits import fitted_of
 
 _DECIDING = ("version_", "cpu_model", "ephemeris_", "orientation_")  # what decides on bits
@@ -20,20 +22,14 @@ _ERRORS = {
 """Announced errors of members: their variables and units."""
 
 
-def summary_of(
-    wanted: Sweep, sources: Sources, reader: TileReader, found: Gathered, wall: float, cpu: float
-) -> SweepSummary:
+def summary_of(wanted: Sweep, sources: Sources, found: Gathered, wall: float, cpu: float) -> SweepSummary:
     """Contents of ``summary.json`` for a complete sweep; seconds of this process."""
     ended_as, warned_of = np.zeros(len(OUTCOMES), dtype=np.int64), np.zeros(len(WARNINGS), dtype=np.int64)
     steps = 0
     worst: dict[str, float] = {}
     estimated: dict[str, list[np.ndarray]] = {name: [] for name in _ERRORS}
     fits: list[tuple[Kept, np.ndarray]] = []
-    always = sources.found[ALWAYS]
-    order = np.argsort(always.tile, kind="stable")
-    edges = np.flatnonzero(np.diff(always.tile[order])) + 1
-    for group in np.split(order, edges):
-        tile, rows = reader.tile(int(always.tile[group[0]])), always.row[group]
+    for tile, _, rows in sources.parts():
         arrays = {name: variable.values[rows] for name, variable in tile.kept.items()}
         ended_as += np.bincount(arrays["status"], minlength=len(OUTCOMES))
         if wanted.fits:
@@ -60,10 +56,9 @@ def summary_of(
         warnings = {"members_failed": said, **warnings}
     fitted, of_fits = fitted_of(fits)
     warnings |= of_fits
-    engines: dict[str, int] = {}
+    engines: Counter[str] = Counter()
     for made in found.made:
-        for engine, number in made["engines"].items():
-            engines[engine] = engines.get(engine, 0) + number
+        engines.update(made["engines"])
     kinds = [{k: v for k, v in made.items() if k.startswith(_DECIDING)} for made in found.made]
     differing = sorted({k for kind in kinds for k, v in kind.items() if v != kinds[0].get(k)})
     mixed = ", ".join(differing) or None
@@ -85,7 +80,7 @@ def summary_of(
         warned=warned,
         warnings=list(warnings.values()),
         warning_codes=list(warnings),
-        engines=engines,
+        engines=dict(engines),
         why_alone=next((made["why_alone"] for made in found.made if made.get("why_alone")), None),
         cost=SweepCost(
             steps=steps,

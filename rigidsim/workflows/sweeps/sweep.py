@@ -1,35 +1,41 @@
 """Running a sweep: tiles of members until all are there, then the dataset; resumable whatever ends it."""
 
 import json
-import multiprocessing
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
 from rigidsim.errors import FORCE, OUT, ConfigError, Problem, RunFolderError
 from rigidsim.scene.scene import build_scene
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.scene.toml_text import apply_overrides, parse_toml
 from rigidsim.scene.validation_messages import shown
 from rigidsim.session.dataset import kernel_attributes
+from rigidsim.store import atomic
 from rigidsim.store.outputs import refuse_inputs
 from rigidsim.store.sweeps.dataset import write_dataset
-from rigidsim.store.sweeps.folder import SweepFolder
+from rigidsim.store.sweeps.folder import Begun, SweepFolder
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
-from rigidsim.store.sweeps.sources import TileReader, gather, sources_of
-from rigidsim.store.sweeps.tiles import Generation
+from rigidsim.store.sweeps.sources import Sources
+from rigidsim.store.sweeps.tiles import identity, read_tile
 from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.fit.readings import folder_of
 from rigidsim.workflows.read import Given, as_experiment, reads_kernels
 from rigidsim.workflows.sweeps.batch import why_alone
-from rigidsim.workflows.sweeps.cluster import Cluster
+from rigidsim.workflows.sweeps.executors import Workers, cluster, processes
 from rigidsim.workflows.sweeps.fits import given_files, keep_data, refuse_other_data
-from rigidsim.workflows.sweeps.members import batches_of, recording, refuse_other_kernel, sweep_of
-from rigidsim.workflows.sweeps.plan import check_sweep, refuse_untold_tiles, tile_length
+from rigidsim.workflows.sweeps.members import (
+    batches_of,
+    get_ready,
+    recording,
+    refuse_other_kernel,
+    sweep_of,
+    tile_image,
+)
+from rigidsim.workflows.sweeps.plan import Each, check_sweep, refuse_untold_tiles, tile_length
 from rigidsim.workflows.sweeps.summary import summary_of
-from rigidsim.workflows.sweeps.ways import Way, Workers
 
 
 class SweepObserver:
@@ -84,6 +90,7 @@ def sweep(
         ConfigError: no sweep, or one of its members can't be run; nothing was written.
         RunFolderError: the folder is in use, holds something else, or can't be written; or data of fits have
             other contents than before.
+        StoppedError: a worker died, or a cluster is gone; what is complete stays.
         RigidsimError: data of fits aren't there.
     """
     given = as_experiment(experiment, changes)
@@ -95,15 +102,10 @@ def sweep(
         raise ConfigError(Problem("out", what), given.source)
     folder = SweepFolder(Path(out) / given.config.name)
     refuse_inputs([folder.path], given.files)
-    return run_sweep(
-        recording(Sweep.of(given)),
-        folder,
-        force=force,
-        way=_way(workers, scheduler),
-        share=tiles,
-        observer=observer or SweepObserver(),
-        beside=folder_of(given),
-    )
+    return _run(
+        recording(Sweep.of(given)), folder, _workers(workers, scheduler), observer or SweepObserver(),
+        force=force, share=tiles, beside=folder_of(given),
+    )  # fmt: skip
 
 
 def resume_sweep(
@@ -114,76 +116,69 @@ def resume_sweep(
     observer: SweepObserver | None = None,
 ) -> SavedSweep:
     """Complete a sweep that was interrupted or killed."""
-    folder = open_sweep(path).folder
-    generations = folder.generations()
-    if not generations:
-        return open_sweep(path)
-    return run_sweep(
-        sweep_of(generations[-1].config), folder, way=_way(workers, scheduler),
-        observer=observer or SweepObserver(),
-    )  # fmt: skip
+    found = open_sweep(path)
+    begun = found.folder.begun
+    if begun is None:
+        return found
+    wanted = sweep_of(begun.config)
+    return _run(wanted, found.folder, _workers(workers, scheduler), observer or SweepObserver())
 
 
-def _way(workers: int, scheduler: str | None) -> Way:
+def _workers(count: int, scheduler: str | None) -> AbstractContextManager[Workers | None]:
     if scheduler is not None:
-        return Cluster(scheduler)
-    if workers > 1 and getattr(multiprocessing.current_process(), "_inheriting", False):
-        # this is a worker, which reads the caller's script again before it begins
-        raise SystemExit(
-            "rigidsim.sweep: workers read the script again that started them, and come upon the sweep "
-            'itself: put what the script does under  if __name__ == "__main__":'
-        )
-    return Workers(workers) if workers > 1 else Way()
+        return cluster(scheduler)
+    return processes(count) if count > 1 else nullcontext()
 
 
-def run_sweep(
+def _run(
     wanted: Sweep,
     folder: SweepFolder,
-    *,
-    way: Way,
+    working: AbstractContextManager[Workers | None],
     observer: SweepObserver,
+    *,
     force: bool = False,
     share: tuple[int, int] | None = None,
     beside: Path | None = None,
 ) -> SavedSweep:
     """See ``sweep``; ``beside``: where data of fits lie, None if the copies in the folder have to do."""
+    begun = None if force else folder.begun
     if share is not None and force:
         raise RunFolderError(f"{FORCE} is for a sweep as a whole, and its tiles are computed by others, too")
-    if share is not None and not folder.generations():
+    if share is not None and begun is None:
         refuse_untold_tiles(wanted)
     files = given_files(wanted) if wanted.fits else []
     refuse_other_data(files, beside, folder.data, anew=force)
     observer.checking(wanted)
     began, cpu = time.perf_counter(), time.process_time()
-    if _complete(wanted, folder) and not force:
+    if not force and _complete(wanted, folder):
         with folder.locked(shared=share is not None):
             done = open_sweep(folder.path)
             done.refuse_damaged()
             observer.nothing_left()
             return done
-    with way.ready_for(wanted):
-        # a sweep that was begun before had all its members checked
-        known = any(g.config_sha256 == wanted.experiment.sha256 for g in folder.generations()[-1:])
-        check_sweep(wanted, every=not known, each=way.each)
-        length = None if known else tile_length(wanted)
+    text, source = wanted.experiment.text, wanted.experiment.source
+    with working as workers:
+        each: Each = map
+        if workers is not None and workers.local:
+            each = workers.executor.map
+            for _ in range(min(workers.count(), wanted.count)):
+                workers.executor.submit(get_ready, text, source)  # while this process still reads and checks
+        known = begun if begun is not None and begun.config_sha256 == wanted.experiment.sha256 else None
+        check_sweep(wanted, every=known is None, each=each)  # a sweep begun before had all members checked
+        length = tile_length(wanted) if known is None else known.tile
         with folder.locked(shared=share is not None):
             if share is None:
-                folder.begin(force=force)
+                folder.claim(force=force)
             _refuse_other(wanted, folder)
             if beside is not None and files:
                 keep_data(files, beside, folder.data)
-            way.data = str(folder.data.absolute())
-            way.source = wanted.experiment.source
-            for begun in folder.generations() if reads_kernels(wanted.base) else ():
-                for tile in folder.present(begun).nonzero()[0][:1].tolist():
-                    made = folder.read(begun, tile).made
-                    refuse_other_kernel(wanted, made, folder.tile(begun, tile))
-            generation = _generation(wanted, folder, length, exclusive=share is not None)
-            interrupted = _run_tiles(folder, generation, way, share, observer)
-            all_there = bool(folder.present(generation).all())
+            if reads_kernels(wanted.base):
+                for path in folder.tile_files()[:1]:
+                    refuse_other_kernel(wanted, read_tile(path).made, path)
+            interrupted, left = _compute(wanted, folder, length, workers, share, observer)
     if interrupted is not None:
         raise interrupted
-    if not all_there:
+    if left:
         return open_sweep(folder.path)
     try:
         with folder.locked():
@@ -209,95 +204,106 @@ def _refuse_other(wanted: Sweep, folder: SweepFolder) -> None:
 
     The config beside a finished dataset tells this, too: its tiles may have been deleted.
     """
-    for config in [g.config for g in folder.generations()[-1:]] or folder.finished_config():
-        try:
-            same = identity(sweep_of(config, wanted.experiment.source)) == identity(wanted)
-        except ConfigError:  # edited, or of a version that had other keys
-            same = False
-        if not same:
-            raise RunFolderError(
-                f"{folder.path}: holds a sweep of another experiment or of other keys; {FORCE} replaces it, "
-                f"another {OUT} or name puts this one elsewhere"
-            )
+    begun = folder.begun
+    if begun is None and not folder.dataset.exists():
+        return
+    try:
+        config = begun.config if begun is not None else folder.config.read_text(encoding="utf-8")
+        same = identity(sweep_of(config, wanted.experiment.source)) == identity(wanted)
+    except (OSError, ValueError, ConfigError):  # edited, gone, or of a version that had other keys
+        same = False
+    if not same:
+        raise RunFolderError(
+            f"{folder.path}: holds a sweep of another experiment or of other keys; {FORCE} replaces it, "
+            f"another {OUT} or name puts this one elsewhere"
+        )
 
 
-def identity(sweep: Sweep) -> str:
-    """What members share: the config without swept values and without values that no number depends on."""
-    tables = parse_toml(sweep.experiment.text, sweep.experiment.source)
-    alone = not tables.get("sweep", {}).get("batch", True)
-    for key in ("name", "description", "sweep"):
-        tables.pop(key, None)
-    for key in ("timeline", "timeline_rows"):
-        tables.get("output", {}).pop(key, None)
-    if not tables.get("output", True):
-        del tables["output"]
-    keys = sorted(axis.key for axis in sweep.axes)
-    apply_overrides(tables, [f'{key}="swept"' for key in keys])
-    return json.dumps([keys, tables, *(["alone"] if alone else [])], sort_keys=True, default=str)
-
-
-def _generation(wanted: Sweep, folder: SweepFolder, length: int | None, *, exclusive: bool) -> Generation:
-    """The latest generation if it is of this config and has all that is missing, otherwise a new one."""
-    generations = folder.generations()
-    latest = [g for g in generations[-1:] if g.config_sha256 == wanted.experiment.sha256]
-    if latest and len(generations) == 1:
-        return latest[0]
-    known = [(g, sweep_of(g.config, wanted.experiment.source)) for g in generations]
-    if latest and not sources_of(wanted, folder, known, to_come=latest[0]).works():
-        return latest[0]  # otherwise tiles of an earlier one are gone
-    works = sources_of(wanted, folder, known).works()
-    number = generations[-1].number + 1 if generations else 0
-    length = length or tile_length(wanted)
-    made = Generation(number, wanted.experiment.text, length, works, _apart(wanted, generations))
-    return folder.add(made, exclusive=exclusive)
-
-
-def _apart(wanted: Sweep, generations: Sequence[Generation]) -> bool | None:
-    """See ``Generation``: as it was found first, so that more members don't change those that are there."""
-    if generations:
-        return generations[0].apart
-    return (
-        None
-        if why_alone(wanted, ())
-        else batches_of(wanted.experiment.text, wanted.experiment.source).apart is not None
-    )
-
-
-def _run_tiles(
+def _compute(
+    wanted: Sweep,
     folder: SweepFolder,
-    generation: Generation,
-    way: Way,
+    length: int,
+    workers: Workers | None,
     share: tuple[int, int] | None,
     observer: SweepObserver,
-) -> KeyboardInterrupt | None:
-    """Compute the missing tiles; returns what interrupted the work, if anything."""
-    present = folder.present(generation)
-    first, stop = (0, generation.tiles) if share is None else share
-    ours = range(max(first, 0), min(stop, generation.tiles))
-    missing = [tile for tile in ours if not present[tile]]
-    members = sum(len(generation.members_of(tile)) for tile in ours) if share else generation.members
-    done = members - sum(len(generation.members_of(tile)) for tile in missing)
-    observer.started(folder.path, members, done)
-    os.utime(folder.generation_file(generation))
+) -> tuple[KeyboardInterrupt | None, bool]:
+    """Compute the missing tiles; returns what interrupted the work, if anything, and whether any is left."""
+    sources, begun = Sources(wanted, folder), folder.begun
+    experiment, sha256 = wanted.experiment, wanted.experiment.sha256
+    blocks = [range(first, min(first + length, wanted.count)) for first in range(0, wanted.count, length)]
+    missing = [
+        number for number, block in enumerate(blocks) if sources.missing[block.start : block.stop].any()
+    ]
+    if begun is None or begun.config_sha256 != sha256:
+        alone = begun.alone if begun is not None else _alone(wanted)
+        begun = Begun(experiment.text, sha256, int(sources.missing.sum()), len(missing), length, alone)
+        folder.begin(begun)
+    os.utime(folder.note)
+    first, stop = share or (0, len(blocks))
+    ours = [number for number in missing if first <= number < stop]
+
+    def tasks() -> Iterator[tuple[Any, ...]]:
+        for number in ours:
+            members, items = sources.wanted(blocks[number])
+            keys = sources.keys[members]
+            path = folder.tile_file(sha256, number, keys, items)
+            data = str(folder.data.absolute())
+            yield path, experiment.text, experiment.source, members, keys, items, begun.alone, data
+
+    todo = sum(int(sources.missing[blocks[number].start : blocks[number].stop].sum()) for number in ours)
+    done = begun.members - todo if share is None else 0
+    observer.started(folder.path, done + todo, done)
     try:
-        for tile, image in way.images(generation, missing):
-            folder.save(generation, tile, image)
-            done += len(generation.members_of(tile))
+        for task, image in _results(workers, tasks()):
+            if image is not None:
+                atomic.write_bytes(task[0], image)
+            done += len(task[3])
             observer.progressed(done)
     except KeyboardInterrupt as interruption:
-        return interruption
-    return None
+        return interruption, True
+    return None, bool(Sources(wanted, folder).missing.any())
+
+
+def _results(
+    workers: Workers | None, tasks: Iterator[tuple[Any, ...]]
+) -> Iterator[tuple[tuple[Any, ...], bytes | None]]:
+    """Tasks with what their workers send back: the tile, unless it is saved where they see the folder."""
+    if workers is None:
+        return _here(tasks)
+    return workers.each(leave_tile if workers.local else _sent, tasks)
+
+
+def _here(tasks: Iterator[tuple[Any, ...]]) -> Iterator[tuple[tuple[Any, ...], None]]:
+    for task in tasks:
+        leave_tile(*task)
+        yield task, None
+
+
+def leave_tile(path: Path, *task: Any) -> None:
+    """Compute a tile (see ``tile_image``); on return it is saved.
+
+    A worker sends no long answer: what was half written into the pipe of its pool when it was killed would be
+    waited for, for ever.
+    """
+    atomic.write_bytes(path, tile_image(*task))
+
+
+def _sent(path: Path, *task: Any) -> bytes:
+    return tile_image(*task)
+
+
+def _alone(wanted: Sweep) -> bool | None:
+    """See ``Begun``."""
+    if why_alone(wanted, ()):
+        return None
+    return batches_of(wanted.experiment.text, wanted.experiment.source).alone is not None
 
 
 def _completed(wanted: Sweep, folder: SweepFolder, wall: float, cpu: float) -> SavedSweep:
     """Write dataset and summary once all tiles are there."""
-    generations = folder.generations()
-    sources = sources_of(
-        wanted, folder, [(g, sweep_of(g.config, wanted.experiment.source)) for g in generations]
-    )
-    reader = TileReader(folder, generations)
-    found = gather(sources, reader)
-    summary = summary_of(wanted, sources, reader, found, wall, cpu)
+    sources = Sources(wanted, folder)
+    found = sources.gather()
+    summary = summary_of(wanted, sources, found, wall, cpu)
     attributes = {
         "Conventions": "CF-1.11",
         "title": wanted.experiment.config.name,
@@ -319,7 +325,7 @@ def _completed(wanted: Sweep, folder: SweepFolder, wall: float, cpu: float) -> S
     }
     if reads_kernels(wanted.base):  # of the first member, as the config's own values are
         attributes |= kernel_attributes(build_scene(wanted.experiment_of(0)))
-    digest = write_dataset(folder.dataset, wanted, sources, reader, found, attributes)
+    digest = write_dataset(folder.dataset, wanted, sources, found, attributes)
     summary = summary.having(dataset_sha256=digest)
     folder.write_summary(summary)
     return SavedSweep(folder, summary)

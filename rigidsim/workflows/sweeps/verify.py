@@ -21,12 +21,10 @@ MEMBERS = 100
 _HELD = 64e6  # bytes of a variable that are read at once; larger ones are read member by member
 
 
-def verify_sweep(
-    path: str | Path, *, members: int = MEMBERS, seed: int | None = None, together: int | None = None
-) -> Verdict:
+def verify_sweep(path: str | Path, *, members: int = MEMBERS, seed: int | None = None) -> Verdict:
     """Run some members of a finished sweep again, in other company than before, and compare everything that
-    was kept; the verdict's samples are members. They are drawn anew each time unless a seed is given; how
-    many run ``together`` changes no bit. Raises ``ConfigError``, and ``RunFolderError`` as ``verify`` does.
+    was kept; the verdict's samples are members. They are drawn anew each time unless a seed is given. Raises
+    ``ConfigError``, and ``RunFolderError`` as ``verify`` does.
     """
     if members < 1:
         raise ConfigError(Problem("--members", f"given {members}; one or more are allowed"))
@@ -38,24 +36,15 @@ def verify_sweep(
         refuse_other_kernel(sweep, saved.outcome.provenance, saved.folder.dataset)
         problems = _problems(saved, dataset, sweep)
         chosen = sorted(random.Random(seed).sample(range(sweep.count), min(members, sweep.count)))
-        differing: dict[str, None] = {}
-        first: Difference | None = None
-        held: dict[str, np.ndarray] = {}
-        generations = saved.folder.generations()
-        apart = generations[0].apart if generations else None
-        step = len(chosen) if together is None else together
-        for begin in range(0, len(chosen), step):
-            some = chosen[begin : begin + step]
-            again = run_members(sweep, some, sweep.table.keep, apart, saved.folder.data).kept
-            for name, place, there, here in _differences(dataset, sweep, some, again, held):
-                differing[name] = None
-                if first is None or some[place] < first.sample:
-                    first = Difference(name, some[place], there, here)
+        alone = None if (begun := saved.folder.begun) is None else begun.alone
+        again = run_members(sweep, chosen, sweep.table.keep, alone, saved.folder.data).kept
+        found = _differences(dataset, sweep, chosen, again)
     changed = _environment(saved.outcome.provenance)
     if saved.outcome.mixed_provenance:
         changed.append(f"the sweep itself was computed with different {saved.outcome.mixed_provenance}")
-    identical = not problems and not differing
-    return Verdict(saved.place, identical, problems, first, sorted(differing), changed, len(chosen))
+    first = min(found, key=lambda one: one.sample, default=None)
+    names = sorted({one.variable for one in found})
+    return Verdict(saved.place, not problems and not found, problems, first, names, changed, len(chosen))
 
 
 def _problems(saved: SavedSweep, dataset: xarray.Dataset, sweep: Sweep) -> list[str]:
@@ -72,37 +61,33 @@ def _problems(saved: SavedSweep, dataset: xarray.Dataset, sweep: Sweep) -> list[
 
 
 def _differences(
-    dataset: xarray.Dataset, sweep: Sweep, members: Sequence[int], again: Kept, held: dict[str, np.ndarray]
-) -> list[tuple[str, int, float, float]]:
-    """For each variable the first member in which any bit differs: its place, and both numbers."""
+    dataset: xarray.Dataset, sweep: Sweep, members: Sequence[int], again: Kept
+) -> list[Difference]:
+    """For each variable the first member in which any bit differs, and both numbers."""
     found = []
     for name, variable in sorted(again.items()):
-        here = np.asarray(variable.values, dtype=variable.values.dtype)
+        here = variable.values
         if name not in dataset:
-            found.append((name, 0, float("nan"), float(here.reshape(-1)[0])))
+            found.append(Difference(name, members[0], float("nan"), float(here.reshape(-1)[0])))
             continue
-        there = _saved(dataset, name, sweep, members, held)
+        there = _saved(dataset[name], sweep, members)
         there = there[(slice(None), *(slice(0, size) for size in here.shape[1:]))].astype(here.dtype)
         unequal = first_unequal(there, here)
         if unequal is not None:
-            found.append((name, *unequal))
+            place, *both = unequal
+            found.append(Difference(name, members[place], *both))
     return found
 
 
-def _saved(
-    dataset: xarray.Dataset, name: str, sweep: Sweep, members: Sequence[int], held: dict[str, np.ndarray]
-) -> np.ndarray:
+def _saved(variable: xarray.DataArray, sweep: Sweep, members: Sequence[int]) -> np.ndarray:
     """Saved values of members, (members, ...)."""
-    variable = dataset[name]
     if variable.dims[: len(sweep.dims)] != sweep.dims:  # times that all members share
         return np.broadcast_to(variable.values, (len(members), *variable.shape))
-    if name not in held and variable.nbytes <= _HELD:
-        held[name] = variable.values.reshape(sweep.count, *variable.shape[len(sweep.dims) :])
-    if name in held:
-        return np.asarray(held[name][list(members)])
-    places = np.unravel_index(np.asarray(members), sweep.shape)
-    rows = zip(*(place.tolist() for place in places), strict=True)
-    return np.stack([variable.isel(dict(zip(sweep.dims, row, strict=True))).values for row in rows])
+    if variable.nbytes <= _HELD:
+        values = variable.values.reshape(sweep.count, *variable.shape[len(sweep.dims) :])
+        return np.asarray(values[list(members)])
+    places = ([int(i) for i in np.unravel_index(member, sweep.shape)] for member in members)
+    return np.stack([variable.isel(dict(zip(sweep.dims, place, strict=True))).values for place in places])
 
 
 def _environment(then: dict[str, Any]) -> list[str]:
