@@ -102,6 +102,26 @@ def turning(series: Series, context: Any) -> dict[Harmonic, Vector]:
     return found
 
 
+def by_degree(coefficients: Series) -> list[tuple[int, Series]]:
+    """Coefficients of each degree."""
+    found: dict[int, dict[Harmonic, Any]] = {}
+    for key, value in coefficients.items():
+        found.setdefault(key[0], {})[key] = value
+    return sorted(found.items())
+
+
+def by_powers(parts: list[tuple[int, Symbolic]], inverse: Symbolic, above: int) -> Symbolic:
+    """Sum of expressions, each times ``inverse`` to the power of its degree + ``above``."""
+    if not parts:
+        return hy.expression(0.0)
+    constant = inverse == hy.expression(1.0)
+    (last, total), *others = reversed(parts)
+    for n, part in others:
+        total = part + (total if constant else inverse ** (last - n) * total)
+        last = n
+    return total if constant else inverse ** (last + above) * total
+
+
 def _factor(n: int, m: int, context: Any) -> Any:
     exact = leading(n, m)
     return context.mpf(exact.numerator) / exact.denominator

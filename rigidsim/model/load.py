@@ -8,7 +8,6 @@ Loads in a config, rigidsim's own and those you write in Python all derive from 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from rigidsim.model.inertia import MassDistribution
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.names import written
 from rigidsim.model.orbit_planes import OrbitPlane
+from rigidsim.model.placements.placement import Placement, SourcePlace
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.si import speaks_si
 from rigidsim.model.state_blocks import StateBlock
@@ -38,17 +38,6 @@ STATES_READ = ("attitude", "vertical", "flight")
 """What a load can ask for in ``reads``."""
 
 
-@dataclass(frozen=True)
-class SourcePlace:
-    """Place of a source as seen from the body: unit vector towards it, space axes; its distance in m is
-    ``unit`` (mpf) over ``inverse``.
-    """
-
-    direction: list[Symbolic]
-    inverse: Symbolic
-    unit: Any
-
-
 class Load(SceneLoad):
     """Base of all loads; as it stands it does nothing, and each class defines what it is more.
 
@@ -62,6 +51,7 @@ class Load(SceneLoad):
         remark: what readers should know of it besides its keys.
         reads: states that it must find: "attitude", "vertical", "flight".
         conservative: whether it has a potential that doesn't depend on time.
+        placement: how its source is placed, if it is placed by one.
         orbit, table: what its source is on; all loads on one orbit or table share its states.
         corotating_orbit: circular and in a fixed plane, in whose frame its potential rests: there is Jacobi's
             constant.
@@ -69,7 +59,7 @@ class Load(SceneLoad):
         without_plane: why its source has an orbit, but no known plane; empty if it has one.
         has_source: whether ``source_direction`` is known; nadir, roll and libration count from it.
         attracting_point: centre that its force always points to (mpf, m, space axes).
-        gradient_source: the distant body whose gradient it is, and nothing else.
+        gradient_source: itself, if it is the gravity gradient of a distant body.
         beside: the load that it acts beside, on the same source.
         reacts: whether its source is one of the point masses besides the body, and feels ``reaction``.
         seconds_ahead: by how much the time that it counts in is ahead of the scene's, which rounds it more.
@@ -85,6 +75,7 @@ class Load(SceneLoad):
     reads: frozenset[str] = frozenset()
     conservative = False
     remark: str = ""
+    placement: Placement | None = None
     orbit: KeplerOrbit | None = None
     table: TabulatedOrbit | None = None
     corotating_orbit: KeplerOrbit | None = None

@@ -29,8 +29,7 @@ from rigidsim.model.formulations.rates import Rates
 from rigidsim.model.frames import refuse_without_plane
 from rigidsim.model.load import Load, force_terms, loads_of, torque_terms
 from rigidsim.model.load_estimate import estimate_drive, orbit_tags, probe, start_of
-from rigidsim.model.loads.gravity_gradient import GravityGradient
-from rigidsim.model.loads.point_attraction import MovingAttractor, MovingGradient
+from rigidsim.model.loads.attraction import Attraction
 from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.observables.observable import NEEDS
 from rigidsim.model.orbits.prescribed import places_of
@@ -285,23 +284,23 @@ def refuse_odd_loads(scene: Scene, requirements: Requirements, loads: Sequence[L
 def refuse_second_orbits(scene: Scene, loads: Sequence[Load]) -> None:
     """Refuse the gradient of a source whose place is integrated already: it would act twice."""
     where, bodies = "[[loads]] gravity_gradient", scene.bodies
-    pulling = [load for load in loads if "flight" in load.reads]
-    attractors = [x for load in pulling if (x := getattr(load, "gravitational_parameter", None)) is not None]
+    found = [load for load in loads if isinstance(load, Attraction)]
+    pulling = [load for load in found if load.pulls]
+    attractors = [load.gravitational_parameter for load in pulling if not load.reacts]
     carried = [] if bodies is None else [s for n, s in enumerate(bodies.strengths) if n != bodies.host]
 
     def known(strength: Any, others: list[Any]) -> bool:
         return any(abs(strength - other) <= _SAME_BODY * other for other in others)
 
-    for load in loads:
-        if not isinstance(load, GravityGradient | MovingGradient):
+    for load in found:
+        if load.pulls:
             continue
         if load.reacts:
-            named = [getattr(x, "number", None) for x in pulling if isinstance(x, MovingAttractor)]
-            if getattr(load, "number", None) in named:
+            if any(load.placement == other.placement for other in pulling):
                 what = "given with central_gravity of the same body, which has its torque; remove it"
                 raise ConfigError(Problem(where, what))
-        elif load.gradient_source is not None:
-            strength = load.gradient_source.gravitational_parameter
+        else:
+            strength = load.gravitational_parameter
             if known(strength, attractors):
                 what = "given for the point that attracts the body in flight; central_gravity has its torque "
                 what += "where the body is, and this one would follow another orbit: remove it"

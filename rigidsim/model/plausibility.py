@@ -53,7 +53,7 @@ def about_load(load: Load, fields: LoadFields, where: str, scene: Scene) -> Iter
     """Values of a load's keys by which its source, or the start beside it, is implausible."""
     given: Any = getattr(fields, "gravitational_parameter", None)
     name, elements = getattr(fields, "source", None), getattr(fields, "elements", None)
-    placed, number = fields.placed_by(free_flight=scene.free_flight), getattr(load, "number", None)
+    placed, number = fields.placed_by(free_flight=scene.free_flight), getattr(load.placement, "number", None)
     yield from load.cautions(fields, where, scene)
     yield from _about_radius(fields, where)
     if load.reacts and number is not None:  # one of the point masses

@@ -10,12 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.harmonics import Harmonics, Series, polynomial, turning
+from rigidsim.model.harmonics import Harmonics, by_degree, by_powers, polynomial, turning
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import (
@@ -66,14 +65,6 @@ class TurningHarmonics:
         """Whether it doesn't depend on time."""
         return self.zonal or self.rate == 0
 
-    @cached_property
-    def by_degree(self) -> list[tuple[int, Series]]:
-        """Coefficients of each degree."""
-        found: dict[int, dict[Harmonic, Any]] = {}
-        for key, value in self.coefficients.items():
-            found.setdefault(key[0], {})[key] = value
-        return sorted(found.items())
-
     def _turn(self, m: Kinematics) -> tuple[Symbolic, Symbolic] | None:
         """Cosine and sine of the angle by which its axes have turned; None where that doesn't matter."""
         if self.rests:
@@ -94,7 +85,7 @@ class TurningHarmonics:
         """Sum of f_n times a constant (mpf) of each degree and the inverse distance to the power of n + 1."""
         u, inverse = self.inside(m, outward)
         harmonics, parts = Harmonics(u, m.number, m.scene.context), []
-        for n, series in self.by_degree:
+        for n, series in by_degree(self.coefficients):
             scaled = {key: sizes(n) * c for key, c in polynomial(series, m.scene.context).items()}
             parts.append((n, harmonics.summed(scaled)))
         return by_powers(parts, inverse, 1)
@@ -105,7 +96,7 @@ class TurningHarmonics:
         context = m.scene.context
         harmonics, radial = Harmonics(u, m.number, context), []
         turned: list[list[tuple[int, Symbolic]]] = [[], [], []]
-        for n, series in self.by_degree:
+        for n, series in by_degree(self.coefficients):
             scaled = {key: (n + 1) * sizes(n) * c for key, c in polynomial(series, context).items()}
             radial.append((n, harmonics.summed(scaled)))
             vectors = turning(series, context)
@@ -130,7 +121,7 @@ class TurningHarmonics:
         far = norm(context, place)
         u = [dot(axis, place) / far for axis in frame]
         values, total = Harmonics(u, lambda x: x, context), [context.zero] * 3
-        for n, series in self.by_degree:
+        for n, series in by_degree(self.coefficients):
             size = (self.radius / far) ** (n + 2)
             radial = sum((c * values[k] for k, c in polynomial(series, context).items()), context.zero)
             torque = [context.zero] * 3
@@ -162,15 +153,3 @@ def frame_of(context: Any, pole: Vector, meridian: Any) -> Matrix:
     c, s = context.cos(meridian), context.sin(meridian)
     first = [c * a + s * b for a, b in zip(node, cross(pole, node), strict=True)]
     return [first, cross(pole, first), pole]
-
-
-def by_powers(parts: list[tuple[int, Symbolic]], inverse: Symbolic, above: int) -> Symbolic:
-    """Sum of expressions, each times ``inverse`` to the power of its degree + ``above``."""
-    if not parts:
-        return hy.expression(0.0)
-    constant = inverse == hy.expression(1.0)
-    (last, total), *others = reversed(parts)
-    for n, part in others:
-        total = part + (total if constant else inverse ** (last - n) * total)
-        last = n
-    return total if constant else inverse ** (last + above) * total

@@ -7,8 +7,8 @@ from rigidsim.model.formulations.formulation import ModelPlan
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.load_estimate import effect_at_start
 from rigidsim.model.load_words import length_text
-from rigidsim.model.loads.kernel_attractor import KernelAttractor
 from rigidsim.model.loads.uniform_gravity import UniformGravity
+from rigidsim.model.placements.flight import FlownByKernel
 from rigidsim.model.plausibility import about_load, about_named_strength
 from rigidsim.model.sources import sources_of
 from rigidsim.scene import attitude
@@ -180,7 +180,11 @@ def cautions_of(scene: Scene) -> list[Caution]:
         if isinstance(load, tuple(LOADS["body"].values())):
             found += load.cautions(scene.config.body, "[body]", scene)
     named, host = [getattr(fields, "source", None) for fields in scene.config.loads], scene.host
-    if host and host not in named and any(isinstance(load, KernelAttractor) for load in scene.given_loads):
+    if (
+        host
+        and host not in named
+        and any(isinstance(load.placement, FlownByKernel) for load in scene.given_loads)
+    ):
         text = (
             f'[body] host: given "{host}", whose own gravity no load has, so that only what others do to it '
         )

@@ -13,10 +13,9 @@ import mpmath
 from rigidsim.analysis.labels import Known
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import loads_of
+from rigidsim.model.loads.attraction import ByPlacedSource
 from rigidsim.model.loads.elasticity import Elasticity
 from rigidsim.model.loads.fluid_core import FluidCore, core_of
-from rigidsim.model.loads.gravity_gradient import GravityGradient
-from rigidsim.model.loads.point_attraction import MovingGradient
 from rigidsim.model.sources import in_body_axes
 from rigidsim.scene.arithmetic import Vector, dot, norm
 from rigidsim.scene.scene import Scene
@@ -185,7 +184,7 @@ def _spin_change(scene: Scene, turning: _Turning, known: type | None = None) -> 
     for load in loads_of(scene):
         source = load.gradient_source
         if source is not None:
-            distance = source.placement.nearest(scene.context)
+            distance = source.placement.nearest(scene)
             tides += 3 * source.gravitational_parameter / distance**3 / turning.rate**2
         elif known is None or not (load.beside or isinstance(load, known)):
             return None
@@ -211,7 +210,7 @@ def _modes_of_core(scene: Scene) -> list[Known]:
     (wobble, fading), (nutation, core_fading) = found
     source = "linearised equations of mantle and core"
     pulled = all(
-        x.beside or isinstance(x, GravityGradient | MovingGradient | FluidCore) for x in loads_of(scene)
+        isinstance(x, FluidCore) or (isinstance(x, ByPlacedSource) and not x.pulls) for x in loads_of(scene)
     )
     rough, symmetric = 0.0 if pulled else _TORQUES, abs(moments[0] - moments[1]) <= _SYMMETRIC * moments[2]
     errors = [float(_SMALL * abs(x) + y) for x, y in ((wobble, fading), (nutation, core_fading))]

@@ -16,8 +16,8 @@ SATELLITE = (
 
 def at(body: str, seconds: float) -> tuple[float, float, float]:
     """Ecliptic longitude and latitude (degrees) and distance (m)."""
-    found = source_position(body, hy.time)
-    function = hy.cfunc([*found.direction, found.inverse_distance], [hy.make_vars("none")], compact_mode=True)
+    direction, nearness = source_position(body, hy.time)
+    function = hy.cfunc([*direction, nearness], [hy.make_vars("none")], compact_mode=True)
     x, y, z, inverse = function([0.0], time=seconds)
     assert x * x + y * y + z * z == pytest.approx(1, abs=1e-14)
     return (

@@ -167,7 +167,7 @@ FIELD = "gravity_field = "
 NONSENSE = {
     "degree without a field": ("", gradient_of(), "has no gravity_field; give it, or leave degree out"),
     "beyond its end": (LUMPS, gradient_of(degree=5), "ends at degree 4"),
-    "first degree": (FIELD + '{radius = 1, C = {"1,0" = 0.1}}', "", "the centre of mass is the origin"),
+    "first degree": (FIELD + '{radius = 1, C = {"1,0" = 0.1}}', "", "degrees from 3 to 200"),
     "both": (FIELD + '{radius = 1, C = {"3,0" = 0.1}, file = "x.gfc"}', "", "exactly one of file, radius"),
 }
 

@@ -138,7 +138,7 @@ def kept_resonance(
 
 def told_of_resonances(sources: Sequence[Source]) -> str:
     """How resonances with point masses were looked for; empty without point masses."""
-    masses = [(source.of.pair.name, source.motion > 0) for source in sources if source.of.pair]
+    masses = [(source.of.placement.name, source.motion > 0) for source in sources if source.of.reacts]
     bound, passing = ([name for name, holds in masses if holds is held] for held in (True, False))
     told = []
     if bound:

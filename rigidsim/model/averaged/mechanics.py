@@ -19,6 +19,7 @@ from rigidsim.model.load import Load, Term
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.model.orbits.prescribed import OrbitStates, element_states
+from rigidsim.model.placements.point_mass import PlacedAsMass
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor
@@ -229,13 +230,11 @@ class AveragedMechanics(Mechanics):
         orbit = source.of.orbit
         if orbit is not None:
             return self._pull_in_plane(source, orbit, s)
-        if source.of.pair is not None:
-            return self._pull_of_mass(source, source.of.pair, s)
-        direction, inverse = source.of.placement.seen(self)
-        factor = self._strength(source) * dot(direction, s)
-        if inverse is not None:
-            factor = factor * inverse**3
-        return [factor * x for x in direction]
+        if isinstance(source.of.placement, PlacedAsMass):
+            return self._pull_of_mass(source, source.of.placement.pair, s)
+        place = source.of.placement.seen(self)
+        factor = self._strength(source) * dot(place.line, s) * place.inverse**3
+        return [factor * x for x in place.line]
 
     def _strength(self, source: Source) -> Symbolic:
         return as_factor(self.number(self.of.rate(source) * self.unit))

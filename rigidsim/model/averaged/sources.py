@@ -10,8 +10,8 @@ from typing import Any, Self
 import numpy as np
 
 from rigidsim.model.averaged.orbit_terms import Ellipse, OrbitPlace, place_by_elements
-from rigidsim.model.gradient import GradientSource
 from rigidsim.model.load import Load
+from rigidsim.model.loads.attraction import Attraction
 from rigidsim.scene.arithmetic import Vector, eccentric_anomaly, norm
 from rigidsim.scene.kepler import eccentric_anomalies, plane_vectors
 from rigidsim.scene.orbit_tables.pieces import AXIS
@@ -23,7 +23,7 @@ class Source:
     """The source of one gravity gradient; a point mass is judged by its osculating orbit of the start."""
 
     number: int  # position of its ``[[loads]]`` table, from 1
-    of: GradientSource
+    of: Attraction
     strength: Any  # 3 G M / a^3 (mpf, 1/s^2), a being ``Placement.distance``
     # as in ``Circuit``:
     motion: float = 0.0
@@ -34,7 +34,7 @@ class Source:
     passing_rate: float | None = None
 
     @classmethod
-    def at_start(cls, context: Any, number: int, source: GradientSource) -> Self:
+    def at_start(cls, context: Any, number: int, source: Attraction) -> Self:
         """The source as it moves at the start."""
         size = 3 * source.gravitational_parameter / source.placement.distance(context) ** 3
         return cls(number, source, size, **vars(source.placement.circuit(context)))

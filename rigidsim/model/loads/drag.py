@@ -19,8 +19,7 @@ from rigidsim.model.flight_names import RELATIVE_NAMES, flown_about
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.loads.applied import Applied
-from rigidsim.model.loads.central_gravity import CentralGravity
-from rigidsim.model.loads.point_attraction import PointAttraction
+from rigidsim.model.loads.attraction import Attraction
 from rigidsim.model.loads.surface_load import Pushes, SurfaceLoad
 from rigidsim.model.names import written
 from rigidsim.model.plausibility import about_altitude
@@ -153,10 +152,10 @@ def _altitudes(scene: Scene) -> tuple[Any, Any] | None:
     source, context = flown_about(scene.config), scene.context
     load = None if source is None else source.of(scene)
     others = [x for x in loads_of(scene) if x is not load]
-    if source is None or not isinstance(load, CentralGravity) or any(map(_steers, others)):
+    if source is None or load is None or load.attracting_point is None or any(map(_steers, others)):
         return None
     place = [-x for x in load.source_at_start(scene)]
-    least, largest = kepler_reach(context, place, load.motion_at_start(scene), load.strength)
+    least, largest = kepler_reach(context, place, load.motion_at_start(scene), load.gravitational_parameter)
     if largest is None or least < largest * _FALLING:
         return None
     surface = source.radius(context) if source.extended else context.zero
@@ -167,7 +166,7 @@ def _steers(load: Load) -> bool:
     """Whether a load may change an orbit by much: a thrust, a body, or what Python gives."""
     if isinstance(load, Applied):
         return load.pushes
-    return isinstance(load, PointAttraction) or not type(load).__module__.startswith("rigidsim.")
+    return (isinstance(load, Attraction) and load.pulls) or not type(load).__module__.startswith("rigidsim.")
 
 
 def _range(part: Expression, reach: tuple[Any, Any], scene: Scene) -> float:

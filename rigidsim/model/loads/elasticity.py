@@ -22,11 +22,11 @@ import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.distortion import Distortion, SeenTide, total
-from rigidsim.model.gradient import GradientSource
 from rigidsim.model.inertia import ConstantInertia, MassDistribution
 from rigidsim.model.kinematics import Kinematics, in_common_unit, inertia_times
 from rigidsim.model.load import Load, Term, loads_of
 from rigidsim.model.load_words import span_words
+from rigidsim.model.loads.attraction import Attraction
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic, transpose
 from rigidsim.model.rotations import apply as turned
@@ -167,7 +167,7 @@ class Elasticity(Load):
     def reads(self) -> frozenset[str]:  # type: ignore[override]
         return frozenset({"attitude"} if self.raising else ())
 
-    def sources(self, scene: Scene) -> list[GradientSource]:
+    def sources(self, scene: Scene) -> list[Attraction]:
         """The sources that raise tides.
 
         Raises:
@@ -229,7 +229,7 @@ class Elasticity(Load):
         )
         return ask(distortion, bare, tides)
 
-    def _sizes(self, load: GradientSource, unit: Any, scaling: Scaling) -> tuple[Any, Any]:
+    def _sizes(self, load: Attraction, unit: Any, scaling: Scaling) -> tuple[Any, Any]:
         """``SeenTide.lift`` and ``pull``, internal units."""
         strength = load.gravitational_parameter / unit**3
         context = unit.context
@@ -270,7 +270,7 @@ class Elasticity(Load):
         spin = self.strength / 3 * (squared + self.known_rate(scene) ** 2) / least
         tide = context.zero
         for load in self.sources(scene):
-            nearest = load.placement.nearest(context)
+            nearest = load.placement.nearest(scene)
             tide = tide + self.strength * load.gravitational_parameter / nearest**3 / least
         return (spin + tide, 2 * spin) if self.spins else (tide, context.zero)
 

@@ -16,9 +16,10 @@ from pydantic import Field, StrictInt, Tag
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.load import Load, SourcePlace, loads_of
+from rigidsim.model.load import Load, loads_of
 from rigidsim.model.load_words import length_text, value_text
-from rigidsim.model.loads.central_gravity import CentralGravity
+from rigidsim.model.loads.attraction import Attraction
+from rigidsim.model.placements.placement import SourcePlace
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.sources import free_flight, in_body_axes, read_in
 from rigidsim.model.turning_harmonics import TurningHarmonics
@@ -375,10 +376,10 @@ class InMagneticField(Load):
             return centre
         where, given = f"[[loads]] {self.title} field", f'given "{IGRF}", the Earth\'s, '
         for load in loads_of(scene):
-            if not isinstance(load, CentralGravity) or load.position != centre:
+            if not isinstance(load, Attraction) or load.attracting_point != centre:
                 continue
-            if not EARTH.attracts_by(load.strength):
-                what = f"where {value_text(load.strength, 'm^3/s^2')} attracts the body, which isn't the "
+            if not EARTH.attracts_by(strength := load.gravitational_parameter):
+                what = f"where {value_text(strength, 'm^3/s^2')} attracts the body, which isn't the "
                 what += f"Earth; give source_moment, or {EARTH.gravitational_parameter:g} m^3/s^2"
                 raise ConfigError(Problem(where, given + what))
         far = norm(scene.context, [x - a for x, a in zip(scene.position or [], centre, strict=True)])
@@ -395,8 +396,8 @@ class InMagneticField(Load):
     def _nearest(self, scene: Scene) -> Any:
         """Least distance from the dipole, m: that of the Kepler orbit about it, or the start's."""
         loads, centre = loads_of(scene), self._centre(scene)
-        pulling = [x for x in loads if isinstance(x, CentralGravity) and x.position == centre]
-        return pulling[0].nearest_approach(scene) if len(pulling) == 1 else self._far(scene)
+        pulling = [x for x in loads if isinstance(x, Attraction) and x.attracting_point == centre]
+        return pulling[0].placement.nearest(scene) if len(pulling) == 1 else self._far(scene)
 
     def _field(self, m: Kinematics) -> list[Symbolic]:
         """Field B divided by ``_size``, body axes."""

@@ -10,7 +10,7 @@ import heyoka as hy
 from rigidsim.model import first_integrals, fixed_axes
 from rigidsim.model.euler_poles import Poles, angles_of_matrix, squared_factor
 from rigidsim.model.frames import jacobi_constant
-from rigidsim.model.loads.central_gravity import CentralGravity
+from rigidsim.model.loads.attraction import Attraction
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import (
     BODY,
@@ -88,10 +88,10 @@ def energy_scale(m: Mechanics, *, kept: bool = False) -> tuple[Any, str]:
     whole = scale + flight if flight else scale
     # a position far from the origin is rounded as coarsely as it is far, and the potential with it
     pulls = [
-        scene.body.mass * load.gravitational_parameter / load.nearest_approach(scene) ** 2
-        * norm(context, load.position)
+        scene.body.mass * load.gravitational_parameter / load.placement.nearest(scene) ** 2
+        * norm(context, load.attracting_point)
         for load in m.loads
-        if isinstance(load, CentralGravity)
+        if isinstance(load, Attraction) and load.attracting_point is not None
     ]  # fmt: skip
     rounded = sum(pulls, context.zero)
     if rounded > whole:

@@ -31,8 +31,7 @@ def _turns_about_its_figure(m: Mechanics) -> bool:
 
 
 def _moves(load: Load) -> bool:
-    source = (load.beside or load).gradient_source
-    moves = source is not None and source.placement.moves
+    moves = load.placement is not None and load.placement.moves
     return bool(load.orbit or load.table or moves or load.reacts)
 
 

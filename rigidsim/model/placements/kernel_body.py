@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
-import heyoka as hy
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion
-from rigidsim.model.rotations import Symbolic
+from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion, SourcePlace
+from rigidsim.model.rotations import length
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.kernels.ephemeris import Ephemeris
 from rigidsim.scene.kernels.reading import Sight
@@ -78,16 +77,17 @@ class PlacedByKernel(Placement):
     def distance(self, context: Any) -> Any:
         return context.ldexp(context.mpf(1000), self.sight.exponent)
 
-    def seen(self, m: Kinematics) -> tuple[list[Symbolic], Symbolic]:
+    def seen(self, m: Kinematics) -> SourcePlace:
         vector = m.carried(m.sky).seen(self.sight)
-        inverse = 1.0 / hy.sqrt(hy.sum([x * x for x in vector]))
-        return [x * inverse for x in vector], inverse
+        inverse = 1.0 / length(vector)
+        return SourcePlace([x * inverse for x in vector], inverse, self.distance(m.scene.context))
 
     def motion(self, m: Kinematics) -> SourceMotion:
         """The derivatives are those of the series; for what is recorded they have to be states."""
         sky = m.carried(m.sky)
         place, velocity, acceleration = (sky.seen(self.sight, order) for order in range(3))
-        return SourceMotion(place, velocity, acceleration, self.seen(m)[1], self.distance(m.scene.context))
+        found = self.seen(m)
+        return SourceMotion(place, velocity, acceleration, found.inverse, found.unit)
 
     def motion_at_start(self, scene: Scene) -> tuple[Vector, Vector, Vector]:
         found = (self.ephemeris.place(scene.context, self.sight, scene.start, order) for order in range(3))
@@ -98,12 +98,8 @@ class PlacedByKernel(Placement):
     def sights(self) -> tuple[tuple[Sight, int], ...]:  # type: ignore[override]
         return ((self.sight, 0),)
 
-    def at_start(self, scene: Scene) -> Vector:
-        return self.at(scene.context, scene.start)
-
-    def at(self, context: Any, time: Any) -> Vector:
-        """Place (mpf, m) at a time of the scene, s."""
-        return self.ephemeris.place(context, self.sight, time)
+    def at_start(self, scene: Setting) -> Vector:
+        return self.ephemeris.place(scene.context, self.sight, scene.start)
 
     # --- sizes, from samples in double precision ----------------------------------------------------------
 
@@ -125,11 +121,11 @@ class PlacedByKernel(Placement):
         turning = float(np.linalg.norm(np.cross(before, after))) / (2 * step * least**2)
         return 1000 * least, 1000 * most, turning
 
-    def nearest(self, context: Any) -> Any:
-        return context.mpf(self._reach[0])
+    def nearest(self, scene: Setting) -> Any:
+        return scene.context.mpf(self._reach[0])
 
-    def fastest_rate(self, context: Any) -> Any:
-        return context.mpf(self._reach[2])
+    def fastest_rate(self, scene: Setting) -> Any:
+        return scene.context.mpf(self._reach[2])
 
     def circuit(self, context: Any) -> Circuit:
         """From the kernel's positions of up to a century about the start: apsides and nodes go round by the

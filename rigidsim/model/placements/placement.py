@@ -1,23 +1,25 @@
-"""A placement: how a distant source is placed, as seen from the body; the protocol of all ways.
+"""A placement: how a source is placed, as seen from the body.
 
-``rest``, ``prescribed_orbit``, ``series``, ``point_mass`` and ``kernel_body`` have one class each.
+Distant ones are at rest, on prescribed orbits, by series, bodies of a kernel, or point masses; ``flight`` has
+the places of sources that the body itself flies by.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.orbit_planes import OrbitPlane
-from rigidsim.model.orbits.point_mass_states import PointMassPair
+from rigidsim.model.orbits.point_mass_states import Pull
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.point_masses import PointMasses
+from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
 
 
@@ -55,22 +57,45 @@ class SourceMotion:
     unit: Any
 
 
-class Placement(ABC):
+@dataclass(frozen=True)
+class SourcePlace:
+    """Place of a source as seen from the body; its distance in m is ``unit`` (mpf) over ``inverse``.
+
+    Attributes:
+        line: unit vector towards it, space axes; away from it if ``outward``.
+    """
+
+    line: list[Symbolic]
+    inverse: Symbolic
+    unit: Any
+    outward: bool = False
+
+    @property
+    def direction(self) -> list[Symbolic]:
+        """Unit vector towards it."""
+        return [-x for x in self.line] if self.outward else self.line
+
+
+class Placement:
     """How a source is placed; vectors in space axes.
 
     Attributes:
-        name: name of the body that it is, where messages tell it by one; empty for others.
+        name: name of the body that it is, where messages use one; empty for others.
         orbit, table: prescribed elements, whose states all loads on them share; None without.
-        pair: the point mass that it is, and the one that the body is; None for others.
-        moves: whether it moves without being on such an orbit.
+        point: at which it rests while the body flies by it (mpf, m); None for others.
+        flies: whether the body's own flight counts.
+        rests: whether it never moves.
+        dynamic: whether the motion itself changes its distance.
+        moves: whether it moves without being on such an orbit, as a distant source.
         lunisolar: whether the mean elements of Sun and Moon are in its motion.
         wide: whether its expressions are too long to be unrolled.
         axes, epoch: what the space axes and time 0 are in it; None if it holds in any.
-        plane: in which it moves, beside those of ``orbit`` and ``table``; None without one.
+        plane: in which it moves, apart from the planes of ``orbit`` and ``table``; None without one.
         without_plane: why it has an orbit, but no known plane; empty if it has one.
-        seconds_ahead: time of the scene's epoch in the count of its own.
+        seconds_ahead: time of the scene's epoch in its own count.
         of_time: whether it is a series whose arguments are time.
         sights: bodies of a kernel that it is placed by, see ``SceneLoad``.
+        falling: of one seen from an origin that the source accelerates, its place from there.
         untracked: why velocity and acceleration aren't known; empty if they are, by ``motion``.
         without_elements: why it has no ellipse to average over, and what to do; None if it has one, or rests.
     """
@@ -78,7 +103,10 @@ class Placement(ABC):
     name: str = ""
     orbit: KeplerOrbit | None = None
     table: TabulatedOrbit | None = None
-    pair: PointMassPair | None = None
+    point: Vector | None = None
+    flies: ClassVar[bool] = False
+    rests: ClassVar[bool] = False
+    dynamic: ClassVar[bool] = False
     moves: ClassVar[bool] = False
     lunisolar: bool = False
     wide: bool = False
@@ -88,25 +116,40 @@ class Placement(ABC):
     without_plane: str = ""
     seconds_ahead: float = 0.0
     of_time: bool = False
+    sights: tuple[tuple[Sight, int], ...] = ()
+    falling: Placement | None = None
     untracked: str = "only its place is known"
     without_elements: tuple[str, str] | None = None
-    sights: tuple[tuple[Sight, int], ...] = ()
 
-    @abstractmethod
-    def distance(self, context: Any) -> Any:
-        """A distance (mpf, m) of its order: the unit of what ``seen`` gives."""
+    def seen(self, m: Kinematics) -> SourcePlace:
+        """Where it is."""
+        raise NotImplementedError
 
-    @abstractmethod
-    def seen(self, m: Kinematics) -> tuple[list[Symbolic], Symbolic | None]:
-        """Unit vector towards it; ``distance`` over its own, None if that is one."""
-
-    @abstractmethod
-    def at_start(self, scene: Scene) -> Vector:
+    def at_start(self, scene: Setting) -> Vector:
         """Place at the start, m (mpf)."""
+        raise NotImplementedError
 
-    @abstractmethod
+    def nearest(self, scene: Setting) -> Any:
+        """Least distance, m (mpf), for sizes of torques."""
+        return self.distance(scene.context)
+
+    def fastest_rate(self, scene: Setting) -> Any:
+        """Largest rate at which its direction turns, rad/s (mpf)."""
+        return scene.context.zero
+
+    def pictured(self) -> dict[str, Any]:
+        """What a timeline draws it by (``rigidsim.look.record``)."""
+        return {}
+
+    # --- of a distant source --------------------------------------------------------------------------------
+
+    def distance(self, context: Any) -> Any:
+        """A distance (mpf, m) of its order."""
+        raise NotImplementedError
+
     def circuit(self, context: Any) -> Circuit:
         """How it goes round."""
+        raise NotImplementedError
 
     def motion(self, m: Kinematics) -> SourceMotion:
         """Place, velocity and acceleration, where they are known."""
@@ -116,18 +159,26 @@ class Placement(ABC):
         """The same at the start (mpf, SI)."""
         raise NotImplementedError
 
-    def nearest(self, context: Any) -> Any:
-        """Least distance, m (mpf), for sizes of torques."""
-        return self.distance(context)
+    # --- of one that the body flies by ----------------------------------------------------------------------
 
-    def fastest_rate(self, context: Any) -> Any:
-        """Largest rate at which what carries it turns, rad/s (mpf)."""
-        return context.zero
+    def velocity(self, m: Kinematics) -> list[Symbolic]:
+        """Velocity of the body as seen from it, internal units of speed."""
+        raise NotImplementedError
 
-    def rests(self) -> Vector | None:
-        """Its place if it never moves, m (mpf)."""
+    def velocity_at_start(self, scene: Setting) -> Vector:
+        """The same at the start (mpf, m/s)."""
+        raise NotImplementedError
+
+    def flight_bounds(self, scene: Scene, fed: Any) -> tuple[Any, Any] | None:
+        """See ``Load``."""
         return None
 
-    def pictured(self) -> dict[str, Any]:
-        """What a timeline draws it by (``rigidsim.look.record``)."""
-        return {}
+    # --- of one of the point masses -------------------------------------------------------------------------
+
+    def among(self, masses: PointMasses) -> Placement:
+        """The same where the point masses are elsewhere."""
+        return self
+
+    def reaction(self, m: Kinematics, pull: list[Symbolic], sign: int) -> list[Pull]:
+        """Accelerations of point masses where it accelerates the body by ``sign`` times ``pull``."""
+        return []

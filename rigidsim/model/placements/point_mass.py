@@ -1,31 +1,74 @@
-"""One of ``[[bodies]]`` as the source of a body that is one of them, too."""
+"""One of ``[[bodies]]`` as a source."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.orbits.point_mass_states import PointMassPair
-from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion
-from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.arithmetic import Vector
+from rigidsim.model.orbit_planes import OrbitPlane
+from rigidsim.model.orbits.point_mass_states import PointMassPair, Pull
+from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion, SourcePlace
+from rigidsim.model.rotations import Symbolic, unit
+from rigidsim.scene.arithmetic import Vector, cross
+from rigidsim.scene.point_masses import PointMasses
+from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
 
+_UNROLLED = 2
 _ALMOST_PARABOLIC = 0.99  # a larger eccentricity's harmonics, of which a few thousand are told, hardly differ
 
 
 @dataclass(frozen=True)
-class PlacedAsMass(Placement):
-    """A point mass that moves under mutual gravity; it is judged by its osculating orbit of the start."""
+class AmongMasses(Placement):
+    """One of the point masses."""
 
-    pair: PointMassPair
+    masses: PointMasses
+    number: int  # its index among them
+    dynamic: ClassVar[bool] = True
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        return self.masses.names[self.number]
+
+    @property
+    def wide(self) -> bool:  # type: ignore[override]
+        """Whether there are three or more masses, whose equations take ten seconds to compile unrolled."""
+        return len(self.masses.names) > _UNROLLED
+
+    @property
+    def plane(self) -> OrbitPlane:  # type: ignore[override]
+        return OsculatingPlane(self)
+
+    def among(self, masses: PointMasses) -> Placement:
+        return replace(self, masses=masses)
+
+    def away(self, m: Kinematics) -> list[Symbolic]:
+        """Vector from it to the body, space axes, units of length."""
+        raise NotImplementedError
+
+    def encounter(self, scene: Setting) -> tuple[Any, Any]:
+        """Least distance (m), and the angular rate there (rad/s), of body and mass left to themselves."""
+        raise NotImplementedError
+
+    def nearest(self, scene: Setting) -> Any:
+        return self.encounter(scene)[0]
+
+    def fastest_rate(self, scene: Setting) -> Any:
+        return self.encounter(scene)[1]
+
+
+@dataclass(frozen=True)
+class PlacedAsMass(AmongMasses):
+    """A point mass seen from the one that the body is; averages judge it by its osculating orbit."""
+
     untracked = ""
     moves: ClassVar[bool] = True
 
     @property
-    def name(self) -> str:  # type: ignore[override]
-        return self.pair.name
+    def pair(self) -> PointMassPair:
+        """It, and the one that the body is."""
+        return PointMassPair(self.masses, self.number)
 
     @property
     def without_elements(self) -> tuple[str, str]:  # type: ignore[override]
@@ -38,28 +81,44 @@ class PlacedAsMass(Placement):
         ellipse = self.pair.ellipse(context)
         return self.pair.encounter(context)[0] if ellipse is None else ellipse[0]
 
-    def seen(self, m: Kinematics) -> tuple[list[Symbolic], Symbolic]:
-        states = m.carried(m.point_masses)
-        place = states.between(self.pair.host, self.pair.number)
-        ends = min(self.pair.host, self.pair.number), max(self.pair.host, self.pair.number)
-        inverse = states.inverse_distances[ends]
-        unit = m.scene.context.ldexp(self.distance(m.scene.context), -m.scaling.length)
-        return [x * inverse for x in place], m.number(unit) * inverse
+    def encounter(self, scene: Setting) -> tuple[Any, Any]:
+        return self.pair.encounter(scene.context)
+
+    def away(self, m: Kinematics) -> list[Symbolic]:
+        return m.carried(m.point_masses).between(self.number, self.pair.host)
+
+    def seen(self, m: Kinematics) -> SourcePlace:
+        states, host = m.carried(m.point_masses), self.pair.host
+        inverse = states.inverse_distances[min(host, self.number), max(host, self.number)]
+        context = m.scene.context
+        line = [x * inverse for x in states.between(host, self.number)]
+        return SourcePlace(line, inverse, context.ldexp(context.one, m.scaling.length))
+
+    def at_start(self, scene: Setting) -> Vector:
+        return self.pair.place
 
     def motion(self, m: Kinematics) -> SourceMotion:
         """Under the mutual gravity of all as points."""
-        found = m.carried(m.point_masses).relative(self.pair.host, self.pair.number)
-        _, inverse = self.seen(m)
-        context, exponent = m.scene.context, m.scaling.length
-        unit = context.ldexp(context.one, exponent)
-        ratio = m.number(unit / self.distance(context))
-        return SourceMotion(*found, ratio * inverse, unit)
+        found, place = m.carried(m.point_masses).relative(self.pair.host, self.number), self.seen(m)
+        return SourceMotion(*found, place.inverse, place.unit)
 
     def motion_at_start(self, scene: Scene) -> tuple[Vector, Vector, Vector]:
-        return self.pair.masses.relative(self.pair.host, self.pair.number, scene.context)
+        return self.masses.relative(self.pair.host, self.number, scene.context)
 
-    def at_start(self, scene: Scene) -> Vector:
-        return self.pair.place
+    def velocity(self, m: Kinematics) -> list[Symbolic]:
+        velocities = m.carried(m.point_masses).velocities
+        return [a - b for a, b in zip(velocities[self.pair.host], velocities[self.number], strict=True)]
+
+    def velocity_at_start(self, scene: Setting) -> Vector:
+        velocities = self.masses.velocities
+        return [a - b for a, b in zip(velocities[self.pair.host], velocities[self.number], strict=True)]
+
+    def reaction(self, m: Kinematics, pull: list[Symbolic], sign: int) -> list[Pull]:
+        one, ratio = (
+            m.scene.context.one,
+            self.masses.strengths[self.pair.host] / self.masses.strengths[self.number],
+        )
+        return [(self.pair.host, sign * one, pull), (self.number, -sign * ratio, pull)]
 
     def circuit(self, context: Any) -> Circuit:
         least, rate = self.pair.encounter(context)
@@ -71,3 +130,24 @@ class PlacedAsMass(Placement):
         e = min(e + 2 * perturbed, _ALMOST_PARABOLIC)
         doubt = perturbed * motion
         return Circuit(motion, e, closer**-3, doubt, doubt, float(rate))
+
+
+@dataclass(frozen=True)
+class OsculatingPlane(OrbitPlane):
+    """Osculating plane of the body's motion about a moving point mass."""
+
+    source: AmongMasses
+    described = "osculating plane of the source's orbit"
+    called = "normal of the osculating orbit"
+
+    def normal(self, m: Kinematics) -> list[Symbolic]:
+        return unit(cross(self.source.away(m), self.source.velocity(m)))
+
+    def at_start(self, scene: Scene) -> Vector:
+        return cross([-x for x in self.source.at_start(scene)], self.source.velocity_at_start(scene))
+
+    def drift(self, scene: Scene) -> None:
+        return None
+
+    def rate(self, scene: Scene) -> Any:
+        return self.source.encounter(scene)[1]

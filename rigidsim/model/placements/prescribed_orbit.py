@@ -10,11 +10,11 @@ import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.orbits.kepler_motion import KeplerParts
-from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion
-from rigidsim.model.rotations import Symbolic
+from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion, SourcePlace
 from rigidsim.scene.arithmetic import Vector, norm
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
 
 
@@ -23,6 +23,7 @@ class PlacedAtRest(Placement):
     """A source that never moves."""
 
     position: Vector  # m (mpf)
+    rests = True
     untracked = ""
 
     def distance(self, context: Any) -> Any:
@@ -32,22 +33,19 @@ class PlacedAtRest(Placement):
         length = norm(context, self.position)
         return [x / length for x in self.position]
 
-    def seen(self, m: Kinematics) -> tuple[list[Symbolic], None]:
-        return m.fixed(self._direction(m.scene.context)), None
+    def seen(self, m: Kinematics) -> SourcePlace:
+        context = m.scene.context
+        return SourcePlace(m.fixed(self._direction(context)), hy.expression(1.0), self.distance(context))
 
-    def at_start(self, scene: Scene) -> Vector:
+    def at_start(self, scene: Setting) -> Vector:
         return self.position
 
     def motion(self, m: Kinematics) -> SourceMotion:
-        context, zero = m.scene.context, [hy.expression(0.0)] * 3
-        place = m.fixed(self._direction(context))
-        return SourceMotion(place, zero, zero, hy.expression(1.0), self.distance(context))
+        place, zero = self.seen(m), [hy.expression(0.0)] * 3
+        return SourceMotion(place.line, zero, zero, place.inverse, place.unit)
 
     def motion_at_start(self, scene: Scene) -> tuple[Vector, Vector, Vector]:
         return self.position, [scene.context.zero] * 3, [scene.context.zero] * 3
-
-    def rests(self) -> Vector:
-        return self.position
 
     def circuit(self, context: Any) -> Circuit:
         return Circuit()
@@ -66,14 +64,15 @@ class PlacedOnOrbit(Placement):
     def distance(self, context: Any) -> Any:
         return self.orbit.semi_major_axis
 
-    def nearest(self, context: Any) -> Any:
+    def nearest(self, scene: Setting) -> Any:
         return self.orbit.pericentre
 
-    def seen(self, m: Kinematics) -> tuple[list[Symbolic], Symbolic | None]:
+    def seen(self, m: Kinematics) -> SourcePlace:
         place = m.orbit(self.orbit)
-        return place.direction, None if self.orbit.circular else place.inverse_distance
+        inverse = hy.expression(1.0) if self.orbit.circular else place.inverse_distance
+        return SourcePlace(place.direction, inverse, self.orbit.semi_major_axis)
 
-    def at_start(self, scene: Scene) -> Vector:
+    def at_start(self, scene: Setting) -> Vector:
         return self.orbit.place(scene.context, scene.start)
 
     def motion(self, m: Kinematics) -> SourceMotion:
@@ -91,8 +90,8 @@ class PlacedOnOrbit(Placement):
         slow = abs(float(orbit.node_rate)) + abs(float(orbit.periapsis_rate))
         return Circuit(abs(float(orbit.mean_motion)), e, (1 - e) ** -3, slow)
 
-    def fastest_rate(self, context: Any) -> Any:
-        return self.orbit.fastest_rate(context)
+    def fastest_rate(self, scene: Setting) -> Any:
+        return self.orbit.fastest_rate(scene.context)
 
     def pictured(self) -> dict[str, Any]:
         names = [field.name for field in dataclasses.fields(self.orbit)]
@@ -109,14 +108,14 @@ class PlacedByTable(Placement):
     def distance(self, context: Any) -> Any:
         return self.table.semi_major_axis
 
-    def nearest(self, context: Any) -> Any:
+    def nearest(self, scene: Setting) -> Any:
         return self.table.pericentre
 
-    def seen(self, m: Kinematics) -> tuple[list[Symbolic], Symbolic]:
+    def seen(self, m: Kinematics) -> SourcePlace:
         place = m.table(self.table)
-        return place.direction, place.inverse_distance
+        return SourcePlace(place.direction, place.inverse_distance, self.table.semi_major_axis)
 
-    def at_start(self, scene: Scene) -> Vector:
+    def at_start(self, scene: Setting) -> Vector:
         return self.table.place(scene.start)
 
     def circuit(self, context: Any) -> Circuit:
@@ -125,5 +124,5 @@ class PlacedByTable(Placement):
         nearest = float(table.semi_major_axis / table.pericentre) ** 3
         return Circuit(float(table.mean_motion), float(table.largest_eccentricity), nearest, slow)
 
-    def fastest_rate(self, context: Any) -> Any:
+    def fastest_rate(self, scene: Setting) -> Any:
         return self.table.fastest_rate()

@@ -18,12 +18,12 @@ import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics, seconds
 from rigidsim.model.orbit_planes import EclipticPlane, OrbitPlane
-from rigidsim.model.placements.placement import Circuit, Placement
+from rigidsim.model.placements.placement import Circuit, Placement, SourcePlace
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.scene import Scene
+from rigidsim.scene.registry import Setting
 from rigidsim.scene.space_axes import ECLIPTIC
 from rigidsim.scene.tracing.numbers import plain
 
@@ -34,16 +34,10 @@ _MEAN = {"sun": (365.25636, 0.0167), "moon": (27.32166, 0.0549)}
 MEAN_DISTANCE = {"sun": 149597870700, "moon": 384400000}  # m
 
 
-@dataclass(frozen=True)
-class SourcePosition:
-    """A geocentric direction and distance."""
-
-    direction: list[Symbolic]  # unit vector, space axes
-    inverse_distance: Symbolic  # mean distance over distance
-
-
-def source_position(body: str, seconds: Symbolic) -> SourcePosition:
-    """Position of the Sun ("sun") or the Moon ("moon") at a time in seconds since J2000, an expression."""
+def source_position(body: str, seconds: Symbolic) -> tuple[list[Symbolic], Symbolic]:
+    """Geocentric unit vector to the Sun ("sun") or the Moon ("moon"), space axes, and mean distance over
+    distance, at a time in seconds since J2000, an expression.
+    """
     if body == "sun":
         millennia = seconds * (1.0 / (_DAY * 365250.0))
         earth = hy.model.vsop2013_cartesian(3, time_expr=millennia, thresh=_THRESHOLD)
@@ -53,7 +47,7 @@ def source_position(body: str, seconds: Symbolic) -> SourcePosition:
         kilometres = hy.model.elp2000_cartesian_e2000(time_expr=centuries, thresh=_THRESHOLD)
         position = [x * (1.0 / 384400.0) for x in kilometres]
     inverse = 1.0 / hy.sqrt(hy.sum([x * x for x in position]))
-    return SourcePosition([x * inverse for x in position], inverse)
+    return [x * inverse for x in position], inverse
 
 
 @dataclass(frozen=True)
@@ -88,15 +82,15 @@ class PlacedBySeries(Placement):
     def distance(self, context: Any) -> Any:
         return context.mpf(MEAN_DISTANCE[self.body])
 
-    def seen(self, m: Kinematics) -> tuple[list[Symbolic], Symbolic]:
-        series = source_position(self.body, seconds(m, since=self.epoch))
-        return series.direction, series.inverse_distance
+    def seen(self, m: Kinematics) -> SourcePlace:
+        found = source_position(self.body, seconds(m, since=self.epoch))
+        return SourcePlace(*found, self.distance(m.scene.context))
 
-    def at_start(self, scene: Scene) -> Vector:
+    def at_start(self, scene: Setting) -> Vector:
         """Place at the start, m, in double precision."""
         context = scene.context
-        series = source_position(self.body, hy.time)
-        function = hy.cfunc([*series.direction, series.inverse_distance], [], compact_mode=True)
+        towards, nearness = source_position(self.body, hy.time)
+        function = hy.cfunc([*towards, nearness], [], compact_mode=True)
         *direction, inverse = function([], time=float(plain(scene.start)) + self.seconds_ahead)
         far = self.distance(context) / context.mpf(inverse)
         return [far * context.mpf(x) for x in direction]

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, Self
 
 from pydantic import Field, StrictInt, StrictStr, field_validator, model_validator
 
@@ -45,10 +45,53 @@ Harmonic = tuple[int, int, bool]
 """Degree n, order m, and whether it goes with sin m lon."""
 
 
-class GravityFieldTable(ConfigTable):
+class HarmonicsTable(ConfigTable):
+    """Base of tables with unnormalized coefficients ``C`` and ``S`` by "degree,order"."""
+
+    least: ClassVar[int]  # degree
+    below: ClassVar[str]  # what gives those of lower degrees
+
+    @field_validator("C", "S", check_fields=False)
+    @classmethod
+    def _orders(cls, value: dict[str, Any] | None, info: Any) -> dict[str, Any] | None:
+        for key in value or ():
+            match = _KEY.fullmatch(key)
+            if match is None:
+                what = f'degree and order are allowed, such as "{cls.least},0"'
+                raise refuse(f"given the key {shown(key)}; {what}")
+            n, m = int(match[1]), int(match[2])
+            if not cls.least <= n <= MOST:
+                what = f"degrees from {cls.least} to {MOST} are allowed (lower ones are those of {cls.below})"
+                raise refuse(f'given "{key}"; {what}')
+            if m > n:
+                raise refuse(f'given "{key}", but the order is at most the degree: "{n},{n}"')
+            if info.field_name == "S" and m == 0:
+                raise refuse(f'given "{key}" in S, which has no order 0; zonal coefficients are in C')
+        return value
+
+    @model_validator(mode="after")
+    def _some(self) -> Self:
+        if not (self.C or self.S or getattr(self, "file", None)):  # type: ignore[attr-defined]
+            raise refuse(f'missing coefficients; give C = {{"{self.least},0" = ..}} or S')
+        return self
+
+    def coefficients(self, context: Any, fault: Callable[[str], ConfigError]) -> dict[Harmonic, Any]:
+        """All that are given (mpf), in the order of their degrees; refused where no mass has them."""
+        found: dict[Harmonic, Any] = {}
+        for given, sine in ((self.C, False), (self.S, True)):  # type: ignore[attr-defined]
+            for key, value in (given or {}).items():
+                n, m = map(int, key.split(","))
+                found[n, m, sine] = value.at(context)
+        refuse_impossible(found, context, fault)
+        return dict(sorted(found.items()))
+
+
+class GravityFieldTable(HarmonicsTable):
     """``[body] gravity_field``: coefficients in body axes, or a file of them."""
 
     rules = (one_of("file", "radius"), excludes("file", "C", "S"), excludes("radius", "degree"))
+    least = LEAST
+    below = "mass, centre of mass and moments of inertia"
     radius: Positive[Metre] | None = Field(None, examples=["1738 km"])
     """reference radius R of C and S"""
     C: dict[StrictStr, Dimensionless] | None = Field(None, examples=[{"3,0": -8.4e-6, "3,1": 2.8e-5}])
@@ -59,37 +102,6 @@ class GravityFieldTable(ConfigTable):
     """instead: a file next to the config, ICGEM (.gfc) or SHADR (.tab), whose text is copied here"""
     degree: StrictInt | None = Field(None, ge=LEAST, le=MOST, examples=[8])
     """highest degree that is read from the file; by default the highest that a load asks for"""
-
-    @field_validator("C", "S")
-    @classmethod
-    def _orders(cls, value: dict[str, Any] | None, info: Any) -> dict[str, Any] | None:
-        for key in value or ():
-            _refuse_key(key, info.field_name)
-        return value
-
-    @model_validator(mode="after")
-    def _one_source(self) -> GravityFieldTable:
-        if self.file is None and not self.C and not self.S:
-            raise refuse('missing coefficients; give C = {"3,0" = ..} and S = {"3,1" = ..}, or file')
-        return self
-
-
-def _refuse_key(key: str, table: str) -> None:
-    match = _KEY.fullmatch(key)
-    if match is None:
-        raise refuse(f'given the key {shown(key)}; degree and order are allowed, such as "3,0"')
-    n, m = int(match[1]), int(match[2])
-    if n < LEAST:
-        what = "the centre of mass is the origin" if n == 1 else "the inertia tensor says it"
-        raise refuse(
-            f'given "{key}", but degree {n} isn\'t given here, since {what}; remove it (degrees from {LEAST})'
-        )
-    if n > MOST:
-        raise refuse(f'given "{key}"; degrees up to {MOST} are allowed')
-    if m > n:
-        raise refuse(f'given "{key}", but the order is at most the degree: "{n},{n}"')
-    if table == "S" and m == 0:
-        raise refuse(f'given "{key}" in S, which has no order 0; zonal coefficients are in C')
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,12 +160,7 @@ def gravity_field_of(
     if table.file is not None:
         return _of_file(table.file, body, context, texts, degree)
     assert table.radius is not None
-    found: dict[Harmonic, Any] = {}
-    for given, sine in ((table.C, False), (table.S, True)):
-        for key, value in (given or {}).items():
-            n, m = map(int, key.split(","))
-            found[n, m, sine] = value.at(context)
-    _refuse_impossible(found, context)
+    found = table.coefficients(context, fault)
     return GravityField(table.radius.at(context), found, max(n for n, _, _ in found))
 
 
@@ -180,12 +187,14 @@ def _of_file(name: str, body: Any, context: Any, texts: Mapping[str, str], degre
         for sine, x in zip((False, True), row, strict=True):
             found[n, m, sine] = factor * rounded(x, context)
     _refuse_other_tensor(given, found, radius, body, context)
-    _refuse_impossible(found, context, given, " file")
+    refuse_impossible(found, context, lambda text: fault(text, " file"), given)
     beyond = {key: c for key, c in found.items() if key[0] >= LEAST}
     return GravityField(radius, beyond, degree)
 
 
-def _refuse_impossible(found: Mapping[Harmonic, Any], context: Any, given: str = "", key: str = "") -> None:
+def refuse_impossible(
+    found: Mapping[Harmonic, Any], context: Any, fault: Callable[[str], ConfigError], given: str = ""
+) -> None:
     """Refuse coefficients beyond those of any mass within some radii.
 
     Mass within s R has abs(C_nm) <= 2 s^n max abs(P_nm) (n - m)!/(n + m)!, and P_nm^2 <= (n + m)!/(n - m)!.
@@ -197,7 +206,7 @@ def _refuse_impossible(found: Mapping[Harmonic, Any], context: Any, given: str =
             name, size = f"{'S' if sine else 'C'}{n},{m}", context.nstr(plain(value), 8)
             what = f"{given}whose {name} is {size}" if given else f'given {size} as "{n},{m}" in {name[0]}'
             what += f" (unnormalized); no mass within {_WITHIN} radii has more than {context.nstr(most, 3)}: "
-            raise fault(what + "check radius, normalization and signs of exponents", key)
+            raise fault(what + "check radius, normalization and signs of exponents")
 
 
 def _sentence(error: FieldFileError) -> str:

@@ -471,7 +471,7 @@ def _geodetic(scene: Scene) -> list[tuple[str, str]]:
     rates = [0.0]
     for load in loads_of(scene):
         if source := load.gradient_source:
-            distance = float(plain(source.placement.nearest(scene.context)))
+            distance = float(plain(source.placement.nearest(scene)))
             strength = float(plain(source.gravitational_parameter))
             rates.append(1.5 * strength**1.5 / (_LIGHT**2 * distance**2.5))
     size = max(rates) * abs(float(scene.samples.last - scene.start)) * ARCSEC

@@ -1,0 +1,155 @@
+"""The torque and force of a source on the body's field of degree 3 and more: ``degree`` of a load.
+
+With u the unit vector to the source in body axes, r its distance and f_n the body's harmonics of degree n,
+
+    U = -(G M m / r) sum (R/r)^n f_n(u),       N = -(G M m / r) sum (R/r)^n u x grad f_n,
+    a = (G M / r^2) sum (R/r)^n ((n + 1) f_n u + u x (u x grad f_n)),
+
+G M being the source's, m the body's mass, a its acceleration in flight.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.model.harmonics import Harmonics, Series, by_degree, by_powers, polynomial, turning
+from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.load import Load, Term
+from rigidsim.model.load_words import length_text
+from rigidsim.model.loads.attraction import Attraction, ByPlacedSource, along_axes
+from rigidsim.model.placements.placement import SourcePlace
+from rigidsim.model.rotations import Symbolic, apply
+from rigidsim.scene.arithmetic import Vector, across, cross
+from rigidsim.scene.bodies.gravity_field import LEAST, GravityField
+from rigidsim.scene.effect_parts import EffectPart, degree_parts
+from rigidsim.scene.registry import Setting, register_load
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.tracing.numbers import plain
+
+_UNROLLED = 3
+"""Degree up to which the expressions of the torque alone are unrolled: beyond, and with the force, this takes
+three to seven seconds to compile, ten times as long as compact code whose steps cost 1.7 times as much.
+"""
+
+
+@register_load(beside="degree")
+@dataclass(frozen=True, kw_only=True)
+class BodyField(ByPlacedSource):
+    """Attraction of the body's field from degree 3 to a degree."""
+
+    field: GravityField
+    degree: int
+
+    title = "gravity_field"
+    unaveraged = (
+        "the gravity field of degree 3 and more has no average, which the gradient alone has",
+        "set degree = 2",
+    )
+
+    @property
+    def wide(self) -> bool:  # type: ignore[override]
+        return self.placement.wide or self.reacts or self.pulls or self.degree > _UNROLLED
+
+    def acts(self) -> bool:
+        return bool(self._series)
+
+    @cached_property
+    def _series(self) -> list[tuple[int, Series]]:
+        """Coefficients that aren't zero (mpf), unnormalized, of each degree."""
+        return by_degree(self.field.to(self.degree))
+
+    def _energy(self, m: Kinematics, place: SourcePlace, n: int) -> Any:
+        """G M m R^n over the unit of distance to the power of n + 1, internal units of energy (mpf)."""
+        size = m.scene.body.mass * (self.field.radius / place.unit) ** n
+        return size * self.per_distance(m, place, 1, -m.scaling.energy)
+
+    def torque(self, m: Kinematics) -> list[Term]:
+        parts = self._torque(m, self.placement.seen(m))
+        return [term for term in along_axes(m, m.scene.context.one, parts) if term[1] != hy.expression(0.0)]
+
+    def _torque(self, m: Kinematics, place: SourcePlace) -> list[Symbolic]:
+        """Components in body axes, internal units of energy."""
+        harmonics = self._harmonics(m)
+        parts: list[list[tuple[int, Symbolic]]] = [[], [], []]
+        for n, series in self._series:
+            size, vectors = -self._energy(m, place, n), turning(series, m.scene.context)
+            for axis, part in enumerate(parts):
+                along = {key: size * vector[axis] for key, vector in vectors.items()}
+                if any(c != 0 for c in along.values()):
+                    part.append((n, harmonics.summed(along)))
+        return [by_powers(part, place.inverse, 1) for part in parts]
+
+    def potential(self, m: Kinematics) -> Symbolic | None:
+        place = self.placement.seen(m)
+        return self._scalar(m, lambda n: -self._energy(m, place, n), place.inverse, 1)
+
+    def acceleration(self, m: Kinematics) -> tuple[int, list[Symbolic]]:
+        context, scaling, place = m.scene.context, m.scaling, self.placement.seen(m)
+        first, ratio = (
+            self.per_distance(m, place, 2, scaling.time - scaling.speed),
+            self.field.radius / place.unit,
+        )
+        outward = self._scalar(m, lambda n: (n + 1) * first * ratio**n, place.inverse, 2)
+        arm = m.carried(m.scene.body.mass) * place.unit
+        lever = context.ldexp(-1 / arm, scaling.energy + scaling.time - scaling.speed)
+        turned = cross(place.direction, apply(m.matrix, self._torque(m, place)))
+        factor = m.number(lever) * place.inverse
+        return 1, [outward * u + factor * x for u, x in zip(place.direction, turned, strict=True)]
+
+    def _harmonics(self, m: Kinematics) -> Harmonics:
+        return Harmonics(self.source_direction(m), m.number, m.scene.context)
+
+    def _scalar(self, m: Kinematics, size: Callable[[int], Any], inverse: Symbolic, above: int) -> Symbolic:
+        """Sum of f_n times a constant (mpf) of each degree and ``inverse`` to the power of n + ``above``."""
+        harmonics, parts = self._harmonics(m), []
+        for n, series in self._series:
+            scaled = {key: size(n) * c for key, c in polynomial(series, m.scene.context).items()}
+            parts.append((n, harmonics.summed(scaled)))
+        return by_powers(parts, inverse, above)
+
+    def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
+        """Whether the field is symmetric about the axis, too."""
+        context = m.scene.context
+        vectors = (x for _, series in self._series for x in turning(series, context).values())
+        return all(across(context, vector, axis) for vector in vectors)
+
+    def amplitude(self, scene: Scene) -> Any:
+        """Twice a bound of the potential energy at the closest approach: |P_nm|^2 <= (n + m)! / (n - m)!."""
+        context, near, total = scene.context, self.placement.nearest(scene), scene.context.zero
+        for (n, m, _), value in self.field.to(self.degree).items():
+            highest = context.sqrt(context.mpf(math.factorial(n + m)) / math.factorial(n - m))
+            total += abs(value) * highest * (self.field.radius / near) ** n
+        return 2 * total * self.gravitational_parameter * scene.body.mass / near
+
+    # --- from the config ------------------------------------------------------------------------------------
+
+    @staticmethod
+    def effect_parts(fields: Any) -> Iterator[EffectPart]:
+        return degree_parts(fields.degree, LEAST)
+
+    @classmethod
+    def beside_of(cls, load: Any, fields: Any, around: Setting) -> Load | None:
+        assert isinstance(load, Attraction)
+        degree, field, placement = fields.degree, around.body.gravity, load.placement
+        if degree < LEAST:
+            return None
+        if field is None:
+            what = "[body] has no gravity_field; give it, or leave degree out (the inertia tensor "
+            raise around.fault("degree", f"given {degree}, but {what}is degree 2)")
+        if degree > field.degree:
+            what = f"given {degree}, but [body] gravity_field ends at degree {field.degree}"
+            raise around.fault("degree", what)
+        if not placement.dynamic and (near := placement.nearest(around)) < field.radius:
+            far, radius = (length_text(float(plain(x))) for x in (near, field.radius))
+            what = (
+                f"given for a source that comes to {far} from the body's centre, within the radius of [body] "
+            )
+            what += f"gravity_field, {radius}, where its series doesn't hold; place it outside, or "
+            raise around.fault("degree", what + "leave degree out")
+        return load.part(cls, field=field, degree=degree)
