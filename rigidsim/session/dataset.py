@@ -23,7 +23,6 @@ from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import LATE
 from rigidsim.solve.status import Status
 from rigidsim.store import provenance
-from rigidsim.store.provenance import RootAttributes
 from rigidsim.store.summary import Summary
 from rigidsim.store.summary_parts import EventTimes
 from rigidsim.store.variables import LABELS, OF_THE_RUN, SCHEMA_VERSION, Extra, Variable, time_variable
@@ -239,13 +238,18 @@ def event_times(prepared: InitialValueProblem, log: EventLog, last: float) -> di
 
 def root_attributes(
     prepared: InitialValueProblem, parts: Assembly, run_id: str, mixed: str = ""
-) -> RootAttributes:
-    """Attributes of segments, and of a dataset before the end of its run is known."""
+) -> dict[str, Any]:
+    """Attributes of segments, and of a dataset before the end of its run is known.
+
+    ``config`` is the text of what was run, one visible value per key; ``config_given`` as it was given;
+    ``config_set`` the settings, one per line; ``recorded`` the names of the variables along time: if the
+    config names none, a later version may record more by default. Tables are JSON texts.
+    """
     scene, system = prepared.scene, prepared.system
     platform: dict[str, Any] = {f"version_{k}": v for k, v in provenance.versions().items()}
     platform |= {f"code_{k}": v for k, v in provenance.code_target(parts.evaluator.code).items()}
     exponents: dict[str, Any] = {"time": system.scaling.time, "inertia": system.scaling.inertia}
-    return RootAttributes(
+    found: dict[str, Any] = dict(
         title=scene.name,
         comment=scene.description,
         source="rigidsim",
@@ -290,6 +294,11 @@ def root_attributes(
         **platform,
         mixed_provenance=mixed or None,
     )
+    return _known(found)
+
+
+def _known(attributes: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in attributes.items() if value is not None}
 
 
 def kernel_attributes(scene: Scene) -> dict[str, Any]:
@@ -341,21 +350,24 @@ def _recorded(prepared: InitialValueProblem) -> dict[str, Any]:
     }
 
 
-def of_complete(attributes: RootAttributes, summary: Summary, angles_wrapped_from: float) -> RootAttributes:
-    """Attributes of the dataset of a run that ended."""
+def of_complete(attributes: dict[str, Any], summary: Summary, angles_wrapped_from: float) -> dict[str, Any]:
+    """Attributes of the dataset of a run that ended; from ``angles_wrapped_from`` on, s, Euler angles are
+    within one turn, since nobody knows their turns.
+    """
     put_back = {name: row.put_back for name, row in summary.invariants.items()}
     tables = {name: found.as_dict() for name, found in summary.tables.items()}
-    return attributes.having(
-        status=summary.status,
-        status_message=summary.message,
-        warnings="\n".join(summary.warnings),
-        steps=summary.cost.steps,
-        wall_seconds=summary.cost.wall_seconds,
-        cpu_seconds=summary.cost.cpu_seconds,
-        finished_at=provenance.now(),
-        put_back=json.dumps(put_back) if summary.held else None,
-        attitude_error=summary.accuracy.estimated_attitude_error,
-        modelling_error=None if summary.modelling is None else summary.modelling.worst,
-        table_errors=json.dumps(tables) if tables else None,
-        angles_wrapped_from=None if math.isnan(angles_wrapped_from) else angles_wrapped_from,
-    )
+    ended: dict[str, Any] = {
+        "status": summary.status,
+        "status_message": summary.message,
+        "warnings": "\n".join(summary.warnings),
+        "steps": summary.cost.steps,
+        "wall_seconds": summary.cost.wall_seconds,
+        "cpu_seconds": summary.cost.cpu_seconds,
+        "finished_at": provenance.now(),
+        "put_back": json.dumps(put_back) if summary.held else None,
+        "attitude_error": summary.accuracy.estimated_attitude_error,
+        "modelling_error": None if summary.modelling is None else summary.modelling.worst,
+        "table_errors": json.dumps(tables) if tables else None,
+        "angles_wrapped_from": None if math.isnan(angles_wrapped_from) else angles_wrapped_from,
+    }
+    return _known(attributes | ended)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from rigidsim.errors import VIEW, StoppedWritingError
 from rigidsim.scene.schema import Output
@@ -22,7 +23,6 @@ from rigidsim.solve.sampler import Progress
 from rigidsim.solve.status import Status
 from rigidsim.store import provenance
 from rigidsim.store.folder import RunFolder
-from rigidsim.store.provenance import RootAttributes
 from rigidsim.store.run import MemoryRun, MemoryWriter, Run, SavedRun
 from rigidsim.store.segments import Arrays, Chain, SegmentWriter
 from rigidsim.store.summary import Summary
@@ -50,7 +50,7 @@ def execute(
     if isinstance(run.writer, MemoryWriter):
         unused = dataset.unused_variables(prepared, run.progress.steps)
         variables = [variable for variable in run.variables if variable.name not in unused]
-        return MemoryRun(summary, variables, run.writer.blocks, extras, run.ended(summary).as_dict())
+        return MemoryRun(summary, variables, run.writer.blocks, extras, run.ended(summary))
     assert folder is not None
     if run.progress.status.final:
         summary = _completed(run, folder, run.writer, extras, summary)
@@ -84,7 +84,7 @@ class _ActiveRun:
         self.variables = dataset.dataset_variables(prepared)
         self.writer: SegmentWriter | MemoryWriter = MemoryWriter()
         if folder is not None:
-            described, limits = self.attributes.as_dict(), session.tuning.segments
+            described, limits = self.attributes, session.tuning.segments
             self.writer = SegmentWriter(folder.segments, self.variables, described, chain, limits)
         self.recorder = Recorder(
             prepared, parts.evaluator, self.writer, statistics, trail, self.checkpoints, start, beside
@@ -194,7 +194,7 @@ class _ActiveRun:
             chart_changes=chart_changes(prepared, self.parts),
         )
 
-    def ended(self, summary: Summary) -> RootAttributes:
+    def ended(self, summary: Summary) -> dict[str, Any]:
         """Attributes of the dataset."""
         wrapped_from = self.recorder.statistics.angles_wrapped_from
         return dataset.of_complete(self.attributes, summary, wrapped_from)
@@ -221,7 +221,7 @@ def _completed(
             position, kept = run.driver.position(), run.checkpoints
             last = folder.checkpoint, kept.packed(position), kept.events(position)
         unused = dataset.unused_variables(run.prepared, run.progress.steps)
-        attributes = run.ended(summary).as_dict()
+        attributes = run.ended(summary)
         writer.complete(folder.dataset, attributes, extras, unused=unused, checkpoint=last, conclude=conclude)
         session.phases.next("dataset")
         output = run.prepared.scene.config.output

@@ -16,7 +16,7 @@ from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import LATE
 from rigidsim.solve.sampler import Progress
 from rigidsim.solve.status import Status
-from rigidsim.store.provenance import RootAttributes, Use
+from rigidsim.store.provenance import Attributes, repeated
 from rigidsim.store.summary import Summary, as_fields
 from rigidsim.store.summary_parts import (
     Accuracy,
@@ -38,7 +38,7 @@ def summarise(
     *,
     remarks: Sequence[Caution],
     initial: Mapping[str, list[float]],
-    attributes: RootAttributes,
+    attributes: Attributes,
     **ended: Any,
 ) -> Summary:
     """The summary without the digests of files that are still to be written. Remarks on how the session began
@@ -72,8 +72,8 @@ def summarise(
         start=start_of(scene),
         time=span_of(scene),
         loads=told_loads(prepared, sizes=False),
-        bit_for_bit=_bit_for_bit(prepared, progress, attributes.mixed_provenance),
-        provenance=attributes.of_use(Use.REPEATED),
+        bit_for_bit=_bit_for_bit(prepared, progress, attributes.get("mixed_provenance")),
+        provenance=repeated(attributes),
         advice=advice_on(found),
         undefined_samples={name: seen.count for name, seen in found.statistics.undefined.items()},
         **ended,

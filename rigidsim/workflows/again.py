@@ -25,7 +25,7 @@ def experiment_again(dataset: Path) -> Experiment:
         RunFolderError: no config can reproduce it, or a kernel is another one now.
     """
     begun = embedded(dataset)
-    loads = read_attributes(dataset).python_loads
+    loads = read_attributes(dataset).get("python_loads")
     if loads:
         raise RunFolderError(f"{dataset}: the run had loads from Python ({loads}), which its config lacks")
     experiment = as_begun(begun, dataset)
@@ -48,7 +48,7 @@ class MotionAgain:
     @cached_property
     def _experiment(self) -> Experiment:
         found = experiment_again(self.dataset)
-        names = found.config.output.record or (read_attributes(self.dataset).recorded or "").split()
+        names = found.config.output.record or read_attributes(self.dataset).get("recorded", "").split()
         return found.quiet(list(dict.fromkeys([*names, RATES])))
 
     @cached_property

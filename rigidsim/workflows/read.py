@@ -94,7 +94,7 @@ def as_begun(experiment: Experiment, saved: Path) -> Experiment:
     """The experiment with what its begun run records made explicit where the config leaves it open; the text
     stays as it is.
     """
-    output, recorded = experiment.config.output, read_attributes(saved).recorded
+    output, recorded = experiment.config.output, read_attributes(saved).get("recorded")
     if output.record is not None or not recorded:
         return experiment
     known = {*OBSERVABLES, *(table.name for table in experiment.config.states)}
@@ -123,7 +123,7 @@ def refuse_other_kernel(experiment: Experiment, saved: Path) -> None:
         ConfigError: it is missing, or can't be read.
     """
     if reads_kernels(experiment):
-        refuse_others(read_attributes(saved).as_dict(), kernel_attributes(build_scene(experiment)), saved)
+        refuse_others(read_attributes(saved), kernel_attributes(build_scene(experiment)), saved)
 
 
 def reads_kernels(experiment: Experiment) -> bool:

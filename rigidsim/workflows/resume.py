@@ -24,7 +24,7 @@ from rigidsim.solve.status import Status
 from rigidsim.store import atomic
 from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.netcdf import root_attributes
-from rigidsim.store.provenance import Use, read_attributes
+from rigidsim.store.provenance import SYSTEM, changed, platform_of, read_attributes
 from rigidsim.store.reader import open_dataset
 from rigidsim.store.run import SavedRun, open_run
 from rigidsim.store.seal import check_seal
@@ -121,9 +121,9 @@ def _as_it_is(folder: RunFolder, experiment: Experiment, session: Session, loads
         found = read_attributes(folder.dataset)
         summary = with_timeline(summary, folder, experiment.config.output, session.observer)
         summary = summary.having(
-            status=found.status,
-            message=found.status_message or "",
-            exit_code=Status(found.status).exit_code,
+            status=found["status"],
+            message=found.get("status_message", ""),
+            exit_code=Status(found["status"]).exit_code,
         )
         folder.write_summary(summary)
         return certified(SavedRun(folder, summary), experiment, None, session, loads)[0]
@@ -184,17 +184,17 @@ def _prolonged(experiment: Experiment, until: str) -> Experiment:
 def _of_finished(folder: RunFolder) -> Chain:
     """A finished run's dataset and its checkpoint as a chain of segments from which it is prolonged."""
     found = read_attributes(folder.dataset)
-    if found.status != Status.FINISHED.value:
-        raise RunFolderError(f"{folder.path}: cannot be prolonged: {found.status_message}")
+    if found["status"] != Status.FINISHED.value:
+        raise RunFolderError(f"{folder.path}: cannot be prolonged: {found.get('status_message')}")
     if not folder.checkpoint.exists():
         raise RunFolderError(f"{folder.checkpoint}: is missing, so that this run cannot be prolonged")
     last = check_seal(folder.dataset)
     check_seal(folder.checkpoint)
     after = root_attributes(folder.checkpoint)
-    if after.get("run_id") != found.run_id or after.get("previous_seal") != last:
+    if after.get("run_id") != found.get("run_id") or after.get("previous_seal") != last:
         raise RunFolderError(f"{folder.checkpoint}: doesn't belong to {folder.dataset.name} next to it")
     rows = root_attributes(folder.dataset)["rows"]
-    return Chain([folder.dataset, folder.checkpoint], rows, found.run_id or "", last)
+    return Chain([folder.dataset, folder.checkpoint], rows, found.get("run_id", ""), last)
 
 
 def _set_aside(chain: Chain, folder: RunFolder) -> Caution:
@@ -241,16 +241,16 @@ def _compared(prepared: InitialValueProblem, chain: Chain) -> str:
     last = chain.paths[-1]
     saved = read_attributes(last)
     now = attributes_now(prepared, assemble(prepared), chain.run)
-    for name, then, value in saved.changed(Use.SYSTEM, now):
+    for name, then, value in changed(SYSTEM, saved, now):
         raise RunFolderError(f"{last}: cannot be resumed from: its {name} is {then}, now {value}")
-    if saved.python_loads != now.python_loads:
+    if (loads := saved.get("python_loads")) != now["python_loads"]:
         raise RunFolderError(
-            f"{last}: the run was begun with loads from Python ({saved.python_loads}); resume it from Python "
-            "with the same"
+            f"{last}: the run was begun with loads from Python ({loads}); resume it from Python with the same"
         )
     _same_times(prepared, chain)
-    differing = [f"{name} {then} -> {value}" for name, then, value in saved.changed(Use.PLATFORM, now)]
-    return "; ".join([x for x in [saved.mixed_provenance, *differing] if x])
+    others = changed(platform_of(saved), saved, now)
+    differing = [f"{name} {then} -> {value}" for name, then, value in others]
+    return "; ".join([x for x in [saved.get("mixed_provenance"), *differing] if x])
 
 
 def _same_times(prepared: InitialValueProblem, chain: Chain) -> None:

@@ -17,7 +17,7 @@ from rigidsim.solve.status import Status
 from rigidsim.store import provenance
 from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.netcdf import root_attributes
-from rigidsim.store.provenance import Use, read_attributes
+from rigidsim.store.provenance import SETTING, changed, platform_of, read_attributes
 from rigidsim.store.reader import open_dataset
 from rigidsim.store.run import Run, open_run
 from rigidsim.store.seal import check_seal
@@ -112,16 +112,17 @@ def verify(path: str | Path, *, reversed: bool = False, observer: Observer | Non
         claimed = folder.read_summary()
         problems += _summary_problems(claimed, again.outcome, folder)
         problems += _timeline_problems(claimed, folder)
-    for name, then, value in saved.changed(Use.SETTING, now):
+    for name, then, value in changed(SETTING, saved, now):
         problems.append(f"{name} is {then} in the dataset, {value} when run again")
-    changed = [f"{name} {then} -> {value}" for name, then, value in saved.changed(Use.PLATFORM, now)]
+    others = changed(platform_of(saved), saved, now)
+    environment = [f"{name} {then} -> {value}" for name, then, value in others]
     reversal = there_and_back(experiment) if reversed else None
     if reversal is not None and reversal.beyond:
         problems.append(f"{dataset}: {reversal.words}")
-    if saved.mixed_provenance:
-        changed.append(f"the run itself was put together on different machines: {saved.mixed_provenance}")
+    if mixed := saved.get("mixed_provenance"):
+        environment.append(f"the run itself was put together on different machines: {mixed}")
     identical = not problems and not differing
-    return Verdict(str(dataset), identical, problems, first, differing, changed, samples, reversal)
+    return Verdict(str(dataset), identical, problems, first, differing, environment, samples, reversal)
 
 
 def _scratch() -> tempfile.TemporaryDirectory[str]:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import rigidsim.workflows.run as workflow
 from rigidsim.cli.exits import refuse_options
-from rigidsim.cli.screens.closing import print_run
+from rigidsim.cli.screens.summary import print_run
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.scene import build_scene
 from rigidsim.session import progress

@@ -7,9 +7,8 @@ import rigidsim.workflows.resume as resuming
 import rigidsim.workflows.sweeps.sweep as workflow
 import rigidsim.workflows.verify as verifying
 from rigidsim.cli.exits import refuse_options
-from rigidsim.cli.screens.closing import print_run
 from rigidsim.cli.screens.page import answer
-from rigidsim.cli.screens.summary import print_verdict
+from rigidsim.cli.screens.summary import print_run, print_verdict
 from rigidsim.cli.screens.sweeps import SweepProgress, print_sweep
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment

@@ -1,16 +1,16 @@
-"""Output of ``rigidsim info``, ``check``, ``verify`` and ``run --verbose``."""
+"""Output of ``rigidsim run``, ``resume``, ``info``, ``check`` and ``verify``."""
 
 from __future__ import annotations
 
 import math
+import shlex
 import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from rigidsim.cli.screens.outcome import event_text, print_errors, print_modelling, undefined_text
-from rigidsim.cli.screens.page import Page, Styled
+from rigidsim.cli.screens.page import Page, Styled, answer
 from rigidsim.cli.screens.words import (
     advice_line,
     body_text,
@@ -22,49 +22,162 @@ from rigidsim.cli.screens.words import (
 )
 from rigidsim.errors import ConfigError
 from rigidsim.scene.choices import method_named, variables_named
-from rigidsim.scene.readable import span_text
+from rigidsim.scene.readable import YEAR, TimeWords, span_text
+from rigidsim.store.run import Run
 from rigidsim.store.summary import Brief, Summary
-from rigidsim.store.summary_parts import ENGINE, InvariantDrift, TableErrors
+from rigidsim.store.summary_parts import ENGINE, Accuracy, Modelling
 
 if TYPE_CHECKING:
     from rigidsim.workflows.check import Checked
     from rigidsim.workflows.plan import RunPlan
 
-
-def _initial(value: float | tuple[float, ...] | None) -> str:
-    """A number, or the norm of a vector, to recognise it by; all digits are in summary.json."""
-    if value is None:
-        return "-"
-    return f"|{math.hypot(*value):.6g}|" if isinstance(value, tuple) else f"{value:.6g}"
+_EVENTS = 2
+"""Events that are shown with their times unless all is asked for; of more only their number."""
 
 
-def _scales(invariants: dict[str, InvariantDrift]) -> str:
-    """Scales of the drifts; invariants with the same scale together."""
-    names: dict[str, list[str]] = {}
-    for name, row in invariants.items():
-        names.setdefault(row.scale_name, []).append(name)
-    words = {"1": "absolute"}  # norms, and what vanishes for a rotation
-    return "; ".join(f"{words.get(scale, scale)} ({', '.join(of)})" for scale, of in names.items())
+def print_run(result: Run, as_json: bool, *, verbose: bool = False) -> int:
+    """Print how a run ended; returns its exit code."""
+    show = lambda: print_summary(result.outcome, result.place, verbose=verbose)  # noqa: E731
+    answer(as_json, result.summary, show)
+    code = result.outcome.exit_code
+    if code:
+        print(f"rigidsim: {result.outcome.message}", file=sys.stderr)
+    return code
 
 
-def _drift(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2e}"
-
-
-def print_summary(summary: Brief, folder: str, out: Console | None = None, *, loads: bool = False) -> None:
-    """Print the whole summary, as ``info`` and ``run --verbose`` do; with ``loads`` what acts, too."""
+def print_summary(
+    summary: Brief, folder: str, out: Console | None = None, *, verbose: bool = True, loads: bool = False
+) -> None:
+    """Print what can be relied on first, then cost and what to do next; ``verbose`` with body, start, model
+    and invariants, and with ``loads`` what acts, too. Warnings are never left out.
+    """
     on = Page(out)
     color = "green" if summary.status == "finished" else "yellow"
     on.say((summary.name, "bold"), "  ", (summary.status, f"bold {color}"))
-    if summary.description:
+    if verbose and summary.description:
         on.say((summary.description, "dim"))
     if summary.status != "finished":
         on.say(summary.message)
     if isinstance(summary, Summary):
-        _print_ended(summary, summary.loads if loads else (), on)
-    on.line("folder", folder)
-    for number, command in enumerate(next_lines(summary.status, summary.exit_code, folder)):
+        _print_found(summary, on, verbose)
+        if verbose:
+            print_understood(summary, summary.loads if loads else (), on)
+            _print_model(summary, on)
+            _print_invariants(summary, on)
+        _print_cost(summary, on, verbose)
+    more = f"rigidsim info {shlex.quote(folder)}   (invariants, start, cost by phase)"
+    commands = next_lines(summary.status, summary.exit_code, folder)
+    for number, command in enumerate([*commands, *([] if verbose or not folder else [more])]):
         on.line("" if number else "next", command, "cyan")
+
+
+def _print_found(summary: Summary, on: Page, verbose: bool) -> None:
+    on.line("verdict", *verdict_line(summary, brief=not verbose))
+    for warning in summary.warnings:
+        on.line("warning", warning, "bold red")
+    _print_errors(summary.accuracy, on, "attitude" if summary.modelling is None else "axis", verbose)
+    if summary.modelling is not None:
+        _print_modelling(summary.modelling, on, verbose)
+    if (chaos := summary.lyapunov) is not None:
+        what = "chaotic" if chaos.chaotic else "regular"
+        moved = f" (moved by {chaos.moved_over_second_half:.1g} over the second half)" if verbose else ""
+        on.line("motion", f"{what}: largest Lyapunov exponent {chaos.largest_exponent:.3g} 1/s{moved}")
+    if verbose or len(summary.events) <= _EVENTS:
+        for name in summary.events:
+            on.line("event", _event_text(summary, name))
+    else:
+        on.line("events", ", ".join(f"{name}: {count:,}" for name, count in summary.events.items()))
+    if summary.undefined_samples:
+        lost = [f"{name} at {n:,} sample{'s' * (n > 1)}" for name, n in summary.undefined_samples.items()]
+        on.line("missing", f"{', '.join(lost)}: undefined there, NaN is recorded")
+    for advice in filter(None, map(advice_line, summary.advice)):
+        on.line("advice", advice, "cyan")
+    for name, found in summary.tables.items() if verbose else ():
+        on.line(
+            "table",
+            f'"{name}": interpolation misses the source by {found.direction:.1e} rad at most with every '
+            f"other row left out, by about {found.direction * found.expected:.0e} rad with all rows",
+        )
+
+
+def _event_text(summary: Summary, name: str) -> str:
+    """How often an event happened, and when."""
+    count, times = summary.events[name], summary.event_times.get(name)
+    if times is None:
+        return f"{name}: {count:,}"
+    early = times.early or (times.first,)
+    if count > len(early):  # a few, and the last one
+        early = early[:3]
+    span = summary.time  # none of an older version
+    start, end = (span.start_s, span.end_s) if span else (0.0, summary.time_reached)
+    words = TimeWords.of({"epoch": span.epoch, "time_unit": span.unit} if span else {}, start, end)
+    said = [words.moment(time) for time in early]
+    if count > len(said):
+        said += ["..."] * (count > len(said) + 1) + [words.moment(times.last)]
+    return f"{name}: {count:,}, at {', '.join(said)}"
+
+
+def _print_errors(accuracy: Accuracy, on: Page, what: str, verbose: bool) -> None:
+    """Print announced and certified errors, ``verbose`` with how they were chosen and found."""
+    if accuracy.chosen and verbose:
+        on.line("chosen", f"{accuracy.chosen}: {accuracy.chosen_why}")
+    estimate = accuracy.estimated_attitude_error
+    if accuracy.certified is not None:
+        asked = "" if accuracy.requested is None else f", {accuracy.requested:.1e} asked for"
+        text = f"certified to {accuracy.certified:.1e} rad{asked} ({accuracy.how}, "
+        on.line(what, f"{text}{accuracy.times_compared} times)")
+    elif estimate is not None:
+        factor, share = accuracy.amplification or 1.0, accuracy.examined_share
+        unstable = f" ({factor:.1g} times a stable motion's)" if factor > 1 and verbose else ""
+        size = f"uncertain by about {estimate:.1e} rad at the end{unstable}"
+        if what == "axis":
+            size = f"momentum's direction integrated to about {estimate:.1e} rad at the end{unstable}"
+        on.line(what, size if estimate < math.pi else "unknown at the end")
+        if verbose and share is not None and share < 1 and estimate < math.pi:
+            seen = f"the growth of errors was followed over the first {100 * share:.2g} % of the run"
+            on.line("examined", f"{seen} (estimated_how in the summary says more)")
+    elif accuracy.amplification is None:
+        on.line("errors", accuracy.estimated_how)
+    place, speed = accuracy.estimated_position_error, accuracy.estimated_velocity_error
+    if accuracy.certified_position is not None:
+        length = accuracy.requested_position or math.nan
+        on.line("path", f"certified to {accuracy.certified_position:.1e} m, {length:.1e} m asked for")
+    elif place is not None and speed is not None:
+        text = f"position uncertain by about {place:.1e} m, velocity by {speed:.1e} m/s, at the end"
+        on.line("path", text)
+
+
+def _print_modelling(found: Modelling, on: Page, verbose: bool) -> None:
+    """Print how far a reduced model is from the full one, ``verbose`` with how that is known."""
+    if found.momentum_axis is None:
+        on.line("averaged", f"modelling error {found.how}")
+        return
+    text = f"momentum's direction within {found.momentum_axis:.1e} rad of the full model's"
+    if found.figure_axis is not None:
+        text += f", figure axis within {found.figure_axis:.1e} rad"
+    on.line("averaged", text)
+    if not verbose:
+        return
+    if found.angular_momentum_norm is not None and found.energy is not None:
+        text = f"size of the angular momentum within {found.angular_momentum_norm:.1e} of itself, energy of "
+        on.line("", text + f"rotation within {found.energy:.1e}")
+    if not found.whole and found.growth is not None and found.oscillation is not None:
+        span = found.windows[0].end - found.windows[0].start
+        text = f"{len(found.windows)} spans of {span_text(span)} integrated with every rotation: "
+        text += f"{found.oscillation:.1e} rad in each, growing by {found.growth * YEAR:.1e} rad/yr"
+        on.line("", text)
+    if not (found.short_period or found.resonance or found.energy is not None):
+        on.line("", "[model] short_period = true adds the nutation back that averaging removed")
+
+
+def _print_cost(summary: Summary, on: Page, verbose: bool) -> None:
+    cost = summary.cost
+    seconds = sum(spent for phase, spent in cost.seconds.items() if phase != ENGINE)
+    said = f"{cost.steps:,} steps, {summary.samples:,} of {summary.samples_planned:,} samples, "
+    on.line("cost", f"{said}{span_text(seconds)} wall, {span_text(cost.cpu_seconds)} CPU")
+    if verbose and cost.cpu_by_phase:
+        spent = [f"{name.replace('_', ' ')} {span_text(s)}" for name, s in cost.cpu_by_phase.items()]
+        on.line("CPU", f"{', '.join(spent)}; steps alone {span_text(cost.seconds[ENGINE])} wall")
 
 
 def print_understood(told: Checked | RunPlan | Summary, loads: Sequence[str], on: Page) -> None:
@@ -94,12 +207,9 @@ def _shortened(states: Sequence[str]) -> list[str]:
     return [*states[:first], placing[0], "...", placing[-1], *rest]
 
 
-def _print_ended(summary: Summary, loads: Sequence[str], on: Page) -> None:
-    print_understood(summary, loads, on)
-    how = f"tolerance {summary.tolerance:.3g}"
+def _print_model(summary: Summary, on: Page) -> None:
     method = method_named(summary.method)
-    if not method.has_steps:
-        how = f"in {method.title}"
+    how = f"tolerance {summary.tolerance:.3g}" if method.has_steps else f"in {method.title}"
     if summary.held:
         how += ", invariants projected" + from_step(summary.hold_from_step)
     on.line(
@@ -109,44 +219,6 @@ def _print_ended(summary: Summary, loads: Sequence[str], on: Page) -> None:
     )
     if caveat := variables_named(summary.formulation).caveat:
         on.line("", caveat)
-    cost = summary.cost
-    seconds = sum(v for k, v in cost.seconds.items() if k != ENGINE)
-    on.line(
-        "cost",
-        f"{cost.steps:,} steps, {summary.samples:,} of {summary.samples_planned:,} samples, "
-        f"{span_text(seconds)} wall ({span_text(cost.seconds[ENGINE])} integrating), "
-        f"{span_text(cost.cpu_seconds)} CPU",
-    )
-    if cost.cpu_by_phase:
-        spent = [f"{name.replace('_', ' ')} {span_text(s)}" for name, s in cost.cpu_by_phase.items()]
-        on.line("CPU", ", ".join(spent))
-    _print_invariants(summary, on)
-    on.line("drifts", "relative to: " + _scales(summary.invariants))
-    for name, why in summary.unwatched.items():
-        on.line("", f"{name} isn't monitored: {why}")
-    if summary.held:
-        on.line(
-            "projected", "correction: what the drift would have been; the residual is no independent check"
-        )
-    print_errors(summary.accuracy, on, "attitude" if summary.modelling is None else "axis")
-    print_modelling(summary.modelling, on)
-    for number, (name, found) in enumerate(summary.tables.items()):
-        on.line("" if number else "tables", _interpolated(name, found))
-    for number, name in enumerate(summary.events):
-        on.line("" if number else "events", event_text(summary, name))
-    if summary.undefined_samples:
-        on.line("missing", undefined_text(summary.undefined_samples))
-    chaos = summary.lyapunov
-    if chaos is not None:
-        what = "chaotic" if chaos.chaotic else "regular"
-        moved = f"moved by {chaos.moved_over_second_half:.1g} over the second half"
-        on.line("motion", f"{what}: largest Lyapunov exponent {chaos.largest_exponent:.3g} 1/s ({moved})")
-    for warning in summary.warnings:
-        on.line("warning", warning, "bold red")
-    verdict, style = verdict_line(summary)
-    on.line("verdict", verdict, style)
-    for advice in filter(None, map(advice_line, summary.advice)):
-        on.line("advice", advice, "cyan")
 
 
 def _print_invariants(summary: Summary, on: Page) -> None:
@@ -154,23 +226,34 @@ def _print_invariants(summary: Summary, on: Page) -> None:
     held = ["correction"] if summary.held else []
     columns = ["invariant", "initial", "largest drift", "final", "bound", *held]
     rows: list[list[Styled]] = []
+    scales: dict[str, list[str]] = {}  # of drifts; invariants with the same one together
     for name, row in summary.invariants.items():
         sound = row.largest_drift is None or row.largest_drift <= row.bound
         largest = (_drift(row.largest_drift), "" if sound else "red")
         rows.append([name, _initial(row.initial), largest, _drift(row.final_drift), _drift(row.bound)])
         rows[-1] += [_drift(row.put_back)] if held else []
+        scales.setdefault("absolute" if row.scale_name == "1" else row.scale_name, []).append(name)
     if not on.fits(columns, rows):
         columns, rows = columns[:3] + columns[4:], [row[:3] + row[4:] for row in rows]
     on.table(columns, rows)
+    said = "; ".join(f"{scale} ({', '.join(names)})" for scale, names in scales.items())
+    on.line("drifts", f"relative to: {said}")
+    for name, why in summary.unwatched.items():
+        on.line("", f"{name} isn't monitored: {why}")
+    if held:
+        text = "correction: what the drift would have been; the residual is no independent check"
+        on.line("projected", text)
 
 
-def _interpolated(name: str, found: TableErrors) -> str:
-    """Accuracy of a tabulated orbit's interpolation, in words."""
-    expected = found.direction * found.expected
-    return (
-        f'"{name}": interpolation misses the source by {found.direction:.1e} rad at most with every other '
-        f"row left out, by about {expected:.0e} rad with all rows"
-    )
+def _initial(value: float | tuple[float, ...] | None) -> str:
+    """A number, or the norm of a vector, to recognise it by; all digits are in summary.json."""
+    if value is None:
+        return "-"
+    return f"|{math.hypot(*value):.6g}|" if isinstance(value, tuple) else f"{value:.6g}"
+
+
+def _drift(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2e}"
 
 
 def print_checked(found: Checked) -> None:
