@@ -45,8 +45,7 @@ _WHERE = "[output] sensitivity"
 @dataclass(frozen=True)
 class Coefficients:
     """Numbers at some values of the keys (mpf): coefficients that vary (m,), initial values (states,), and
-    the derivatives of both by each key, (m, keys) and (states, keys), per SI unit; without keys where they
-    weren't asked for.
+    the derivatives of both by each key, (m, keys) and (states, keys), per SI unit.
     """
 
     values: list[Any]
@@ -101,7 +100,7 @@ class Parametrised:
         self.values = [key.value(self.context) for key in self.keys] if values is None else list(values)
         own = scene_of(self._experiment, self.keys, self.values, context_for(precision))
         self._plan: ModelPlan = plan_model(own, self._loads)
-        base, found, moved = self._passes(self.values, self._steps)
+        base, found, moved = self._passes(self.values)
         self.plain = System(base.system.plan, number)  # with all that acts once no number is exactly zero
         self.first = parameters_of(self.plain)
         self._varied = [
@@ -124,14 +123,13 @@ class Parametrised:
         """Number of coefficients that vary."""
         return len(self._varied)
 
-    def at(self, values: Sequence[Fraction], *, slopes: bool = True) -> Coefficients | None:
+    def at(self, values: Sequence[Fraction]) -> Coefficients | None:
         """Coefficients at other values of the keys (SI); None if the equations have another form there.
-        Without ``slopes`` derivatives are left out, which saves a pass for each key.
 
         Raises:
             ConfigError: no scene has such values.
         """
-        base, _, moved = self._passes(values, self._steps if slopes else [])
+        base, _, moved = self._passes(values)
         if len(base.noted) != len(self._varied) + len(self._fixed):
             return None
         for i, x in self._fixed.items():
@@ -150,16 +148,14 @@ class Parametrised:
 
     # --- passes -----------------------------------------------------------------------------------------
 
-    def _passes(
-        self, values: Sequence[Fraction], steps: Sequence[Fraction]
-    ) -> tuple[_Pass, list[Fraction], list[_Pass]]:
+    def _passes(self, values: Sequence[Fraction]) -> tuple[_Pass, list[Fraction], list[_Pass]]:
         """The system a little off some values, these, and those with each key moved by a step from there."""
         refused: ConfigError | None = None
         for off in self._standing_off(values):
             try:
                 base = self._pass(off)
                 moved = []
-                for j, step in enumerate(steps):
+                for j, step in enumerate(self._steps):
                     others = [x + step if i == j else x for i, x in enumerate(off)]
                     moved.append(self._pass(others))
             except ConfigError as error:
@@ -215,8 +211,7 @@ class Parametrised:
 
     def _coefficients(self, base: _Pass, moved: Sequence[_Pass]) -> Coefficients:
         context = self.context
-        moving = self._steps[: len(moved)]
-        steps = [context.mpf(step.numerator) / context.mpf(step.denominator) for step in moving]
+        steps = [context.mpf(step.numerator) / context.mpf(step.denominator) for step in self._steps]
 
         def slopes(value: Any, others: Sequence[Any]) -> list[Any]:
             pairs = zip(others, steps, strict=True)

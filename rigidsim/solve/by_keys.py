@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -100,8 +100,8 @@ class Rows:
     derivatives by the keys, (n, keys, components).
     """
 
-    values: dict[str, np.ndarray] = field(default_factory=dict)
-    slopes: dict[str, np.ndarray] = field(default_factory=dict)
+    values: dict[str, np.ndarray]
+    slopes: dict[str, np.ndarray]
 
 
 class KeyTangents:
@@ -140,15 +140,13 @@ class KeyTangents:
         self.use(made.coefficients)
 
     def use(self, found: Coefficients) -> None:
-        """Take coefficients and initial values, to begin anew; without derivatives of these there are none of
-        the motion.
-        """
+        """Take coefficients and initial values, to begin anew."""
         precision, made = self.precision, self.made
         self._values, self._initial = precision.array(found.values), precision.array(found.initial)
-        self._moved: tuple[np.ndarray, np.ndarray] | None = None  # the latest times, and the motion there
-        keys = len(found.initial_slopes[0])
         self._coefficient_slopes, self._initial_slopes = (
-            np.array([precision.array(row) for row in rows], dtype=precision.scalar).reshape(len(rows), keys)
+            np.array([precision.array(row) for row in rows], dtype=precision.scalar).reshape(
+                len(rows), self.keys
+            )
             for rows in (found.slopes, [found.initial_slopes[i] for i in self._moving])
         )
         if self._lanes is not None:
@@ -176,7 +174,7 @@ class KeyTangents:
         """State with tangents at a time (``Tangents.sample``), and the parameters there."""
         return self.tangents.sample(time, go_on), self.tangents.numbers.copy()
 
-    def at(self, times: np.ndarray, *, slopes: bool = True) -> Rows:
+    def at(self, times: np.ndarray) -> Rows:
         """What is recorded at ascending internal times (n,), n > 0, from the start on.
 
         Raises:
@@ -185,11 +183,9 @@ class KeyTangents:
         if self._lanes is None:
             return self.of(times, [self.sample(time) for time in times])
         motion, along = self._lanes
-        if self._moved is None or not np.array_equal(self._moved[0], times):
-            states = self._in_lanes(motion, self._initial[:, None], self._values[:, None], times)
-            self._moved = times, states[:, :, 0]
-        values = self._evaluated(self.made.outputs, self._moved[1], self._values[:, None], times)
-        return self._rows(values, self._along(along, times) if slopes else [])
+        states = self._in_lanes(motion, self._initial[:, None], self._values[:, None], times)[:, :, 0]
+        values = self._evaluated(self.made.outputs, states, self._values[:, None], times)
+        return self._rows(values, self._along(along, times))
 
     def of(self, times: np.ndarray, samples: Sequence[tuple[np.ndarray, np.ndarray]]) -> Rows:
         """The same at some samples (``sample``), n > 0 of them."""
@@ -205,13 +201,12 @@ class KeyTangents:
         return self._rows(self._evaluated(self.made.outputs, states[:, :count], numbers, times), along)
 
     def _rows(self, values: np.ndarray, along: Sequence[np.ndarray]) -> Rows:
-        rows, slopes = Rows(), np.stack(along, axis=1) * self._units if along else None
-        for one in self.made.recorded:
-            part = slice(one.first, one.first + one.count)
-            rows.values[one.name] = (values * self._units)[:, part]
-            if slopes is not None:
-                rows.slopes[one.name] = slopes[:, :, part]
-        return rows
+        parts = {one.name: slice(one.first, one.first + one.count) for one in self.made.recorded}
+        whole, slopes = values * self._units, np.stack(along, axis=1) * self._units
+        return Rows(
+            {name: whole[:, part] for name, part in parts.items()},
+            {name: slopes[:, :, part] for name, part in parts.items()},
+        )
 
     def _evaluated(
         self, expressions: Iterable[Any], states: np.ndarray, numbers: np.ndarray, times: np.ndarray

@@ -91,7 +91,7 @@ class Tangents:
         except ConfigError as error:
             raise error.at(experiment.source) from None
         self._precision, self._source, self._quickly = prepared.precision, experiment.source, quickly
-        self._at, self._sloped = list(self._parametrised.values), True
+        self._at = list(self._parametrised.values)
         self._tangents = self._compiled()
 
     @property
@@ -129,33 +129,32 @@ class Tangents:
         except LostTangents as error:
             raise ConfigError(Problem(_WHERE, f"the motion can't be differentiated: {error}")) from None
 
-    def rows(self, values: Mapping[str, float], times: np.ndarray, *, slopes: bool = True) -> Rows:
-        """The same as it comes, with or without derivatives: all variables in SI.
+    def rows(self, values: Mapping[str, float], times: np.ndarray) -> Rows:
+        """The same as it comes: all variables in SI.
 
         Raises:
             ConfigError: see ``at``.
             LostTangents: the motion or derivatives don't stay finite.
         """
-        self._move_to(values, slopes)
+        self._move_to(values)
         internal = self._internal(times)
         if not len(internal):
             raise ConfigError(Problem("times", "given none; at least one is allowed"), self._source)
-        return self._tangents.at(internal, slopes=slopes)
+        return self._tangents.at(internal)
 
-    def _move_to(self, values: Mapping[str, float], slopes: bool) -> None:
+    def _move_to(self, values: Mapping[str, float]) -> None:
         """Begin anew with these values, compiled again where the equations have another form."""
         keys, context = self._parametrised.keys, self._parametrised.context
         wanted = [Fraction(values[key.name]) if key.name in values else key.value(context) for key in keys]
-        if wanted == self._at and (self._sloped or not slopes):
+        if wanted == self._at:
             self._tangents.begin()
             return
-        coefficients = self._parametrised.at(wanted, slopes=slopes)
+        self._at, coefficients = wanted, self._parametrised.at(wanted)
         if coefficients is None:
-            self._parametrised, slopes = self._parametrised.made_at(wanted), True
+            self._parametrised = self._parametrised.made_at(wanted)
             self._tangents = self._compiled()
         else:
             self._tangents.use(coefficients)
-        self._at, self._sloped = wanted, slopes
 
     def _compiled(self) -> KeyTangents:
         return interruptible(lambda: KeyTangents(self._parametrised, self._precision, quickly=self._quickly))

@@ -18,15 +18,10 @@ differ from one by less than its square are rounding in the derivatives.
 """
 WITHIN = 1e-3
 """A fit has converged once its next step is shorter than so many sigmas."""
-MOST_ITERATIONS = 100
-_FIRST_DAMPING, _AFTER_FAILURE = 1e-6, 1e-3
-_LARGEST_DAMPING = 1e12
-_LEAST_DAMPING = 1e-12
-_CALM = 3  # steps in a row that didn't fail, after which damping falls fast
-_SHORTER = 0.1  # of a step: the next one may have the same derivatives
-_LAST = 0.1  # sigmas: a step as short as this most likely ends a fit, where derivatives are needed anyway
-_LATELY = 10  # evaluations
+MOST_EVALUATIONS = 100
+_DAMPING = 1e-3, 1e12  # the least, below which there is none, and the largest; scaled columns have norm one
 _ROUNDED = 1e-11  # relative change of a sum of squares that rounding makes
+_SHORT = 0.1  # sigmas: a step whose gain rounding may hide
 
 
 @dataclass(frozen=True)
@@ -37,6 +32,7 @@ class Linear:
         residuals: (rows,) observed less computed. slopes: (rows, estimated). considered: (rows, considered).
         noise: (estimated,) norms of columns below which they tell nothing.
         pull: (estimated,) prior value less value. weights: (estimated,) 1/sigma of the prior; 0 for none.
+        sets: of each set of observations the residuals in SI, (rows, components), used or not.
     """
 
     residuals: np.ndarray
@@ -45,6 +41,7 @@ class Linear:
     noise: np.ndarray
     pull: np.ndarray
     weights: np.ndarray
+    sets: list[np.ndarray]
 
     @cached_property
     def triangle(self) -> np.ndarray:
@@ -128,96 +125,53 @@ def consider_covariance(
 
 @dataclass(frozen=True)
 class Ended:
-    """Where an iteration ended.
-
-    Attributes:
-        values: (estimated,). iterations: evaluations of the motion. barred: whether the motion couldn't be
-            computed in one of the last of these.
-    """
+    """Where an iteration ended: at these values (estimated,), after so many evaluations of the motion."""
 
     values: np.ndarray
     linear: Linear
     solution: Solution
     converged: bool
-    iterations: int
-    barred: bool = False
-
-
-Linearised = Callable[..., Linear | None]
-"""The fit at some values, with derivatives there if they are to be ``fresh`` (by default), otherwise with the
-latest ones; None where the motion can't be computed.
-"""
-
-
-def _rounding_is_left(linear: Linear, solution: Solution) -> bool:
-    """Whether the step without damping, too, would change the sum of squares by no more than rounding."""
-    return solution.step_sigmas <= max(_LAST, (10 * _ROUNDED * linear.cost) ** 0.5)
+    evaluations: int
 
 
 def iterate(
     begin: np.ndarray,
-    linearised: Linearised,
+    linearised: Callable[[np.ndarray], Linear | None],
     told: Callable[[str], None] = lambda _: None,
-    most: int = MOST_ITERATIONS,
+    most: int = MOST_EVALUATIONS,
 ) -> Ended | None:
-    """Damped Gauss-Newton steps until they are shorter than ``WITHIN`` sigmas.
-
-    Derivatives cost several times as much as a motion: they are worked out anew where the next step hasn't
-    become much shorter, and with the motion itself where it will most likely be the last one. Where it ends
-    they are those of its values.
+    """Damped Gauss-Newton steps until they are shorter than ``WITHIN`` sigmas, or change the sum of squares
+    by rounding alone.
 
     Args:
         begin: (estimated,) first values.
-        told: receives a line on each iteration.
+        linearised: the fit at some values; None where the motion can't be computed.
+        told: receives a line on each evaluation.
 
     Returns:
         Where it ended; None if the motion can't be computed at the first values.
     """
-    values, linear, fresh = np.array(begin, dtype=float), linearised(begin), True
+    values, linear = np.array(begin, dtype=float), linearised(begin)
     if linear is None:
         return None
-    solution, iterations, settled = Solution(linear), 1, False
-    damping, growth, calm = _FIRST_DAMPING, 2.0, _CALM
-    barred = -_LATELY  # the latest evaluation without a motion
-    while iterations < most and damping < _LARGEST_DAMPING:
-        before, trial = solution.step_sigmas, None
-        told(f"evaluation {iterations}: sum of squares {linear.cost:.6g}, next step {before:.2g} sigmas")
-        settled = settled or before <= WITHIN
-        if settled and fresh:
-            break
-        last = not settled and not fresh and before <= _LAST
-        if not settled:
-            step = solution.step(damping)
-            trial = linearised(values + step, fresh=last)
-            barred = iterations if trial is None else barred
-        iterations += 1
-        rounded = trial is not None and trial.cost <= linear.cost * (1 + _ROUNDED)
-        if trial is not None and (trial.cost < linear.cost or (last and rounded)):
-            gained = (linear.cost - trial.cost) / max(linear.foreseen(step), 1e-300)
-            calm += 1
-            least = 1e-2 if calm > _CALM else 1 / 3  # just after a step that failed, not back to where it did
-            damping = 0.0 if damping < _LEAST_DAMPING else damping * max(least, 1 - (2 * gained - 1) ** 3)
-            settled, growth = trial.cost >= linear.cost, 2.0  # rounding is all that changes any more
-            values, linear, fresh = values + step, trial, last
-            solution = Solution(linear)
-            if fresh or solution.step_sigmas <= _SHORTER * before:
-                continue
-        elif fresh:
-            settled = rounded and _rounding_is_left(linear, solution)  # otherwise damping keeps it here
-            if not settled:
-                damping, growth, calm = max(damping, _AFTER_FAILURE) * growth, 2 * growth, 0
-            continue
-        linear, fresh, settled = _there(linearised, values), True, False
-        solution = Solution(linear)
-    if not fresh:
-        linear = _there(linearised, values)
-        solution = Solution(linear)
-    converged = settled or solution.step_sigmas <= WITHIN
-    return Ended(values, linear, solution, converged, iterations, iterations - barred <= _LATELY)
-
-
-def _there(linearised: Linearised, values: np.ndarray) -> Linear:
-    """The fit where the motion was computed before, with derivatives of these values."""
-    found = linearised(values)
-    assert found is not None
-    return found
+    solution, evaluations, damping, growth = Solution(linear), 1, 0.0, 2.0
+    while True:
+        length, cost = solution.step_sigmas, linear.cost
+        told(f"evaluation {evaluations}: sum of squares {cost:.6g}, next step {length:.2g} sigmas")
+        if length <= WITHIN or evaluations >= most or damping > _DAMPING[1]:
+            return Ended(values, linear, solution, length <= WITHIN, evaluations)
+        step = solution.step(damping)
+        trial, evaluations = linearised(values + step), evaluations + 1
+        if trial is not None and trial.cost < cost:
+            gained = (cost - trial.cost) / max(linear.foreseen(step), 1e-300)
+            damping *= max(1 / 3, 1 - (2 * gained - 1) ** 3)  # Nielsen 1999
+            damping, growth = damping if damping >= _DAMPING[0] else 0.0, 2.0
+            values, linear, solution = values + step, trial, Solution(trial)
+        elif (
+            trial is not None
+            and trial.cost <= cost * (1 + _ROUNDED)
+            and length <= max(_SHORT, (10 * _ROUNDED * cost) ** 0.5)
+        ):  # rounding is all that changes any more; damping doesn't keep it here
+            return Ended(values, linear, solution, True, evaluations)
+        else:
+            damping, growth = max(damping, _DAMPING[0]) * growth, 2 * growth

@@ -205,7 +205,9 @@ def fit_to(experiment: Experiment, places: list[DataFiles], *, told: Told | None
             predictor.how += f" ({error.problems[0].what})"
         times = np.linspace(float(keys.scene.start), float(keys.scene.samples.last), _ALONG_ROWS)
         weighing = Weighing(keys, readings, predictor)
-        found = search(weighing, experiment.config.fit.starts, told or (lambda _: None))
+        ended, costs, more = search(weighing, experiment.config.fit.starts, told or (lambda _: None))
         notes = list(dict.fromkeys(text for one in readings for text in one.told))
-        along = weighing.along(found.ended.values, times)
-        return result_of(experiment.config.name, keys, weighing, found, predictor.how, notes, along, times)
+        along = weighing.along(ended.values, times)
+        return result_of(
+            experiment.config.name, keys, weighing, ended, costs, predictor.how, [*notes, *more], along, times
+        )

@@ -61,15 +61,13 @@ class ByDifferences:
         self._steps = _FIRST * np.array([one.size for one in keys.all])
         self._adapted = False
 
-    def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Prediction:
-        """Predictions, with derivatives if these are asked for, at ascending times (s).
+    def at(self, values: Sequence[float], times: np.ndarray) -> Prediction:
+        """Predictions with derivatives at ascending times (s).
 
         Raises:
             NotPredicted: the motion doesn't get there.
         """
         centre = self.values(values, times)
-        if not slopes:
-            return Prediction(centre)
         found = self._differences(values, times, centre)
         if not self._adapted:
             self._adapt(found)
@@ -167,10 +165,8 @@ class ByTangents:
             stepping, self._keys, record=self._names, quickly=True, where="[fit] parameters"
         )
 
-    def at(
-        self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True, names: Sequence[str] = ()
-    ) -> Prediction:
-        """Predictions, with derivatives if these are asked for, at ascending times (s).
+    def at(self, values: Sequence[float], times: np.ndarray, names: Sequence[str] = ()) -> Prediction:
+        """Predictions with derivatives at ascending times (s).
 
         Args:
             names: of variables, as far as the scene has them; by default those observed.
@@ -180,7 +176,7 @@ class ByTangents:
         """
         given = {key: float(value) for key, value in zip(self._keys, values, strict=True)}
         try:
-            rows = self._source.rows(given, times, slopes=slopes)
+            rows = self._source.rows(given, times)
         except LostTangents as error:
             raise NotPredicted(f"{error}") from None
         except ConfigError as error:
@@ -191,15 +187,12 @@ class ByTangents:
                 continue
             value = rows.values[name].astype(float)
             made.values[name] = normalised(value) if name == QUATERNION else value
-            found = [value]
-            if slopes:  # (n, keys, components)
-                exact = rows.slopes[name]
-                exact = turned(rows.values[name], exact) if name == QUATERNION else exact
-                made.slopes[name] = np.ascontiguousarray(exact.astype(float).transpose(0, 2, 1))
-                size = 1.0 if name == QUATERNION else float(np.abs(value).max()) or 1.0
-                made.noise[name] = _ROUNDING * size / self._sizes
-                found.append(made.slopes[name])
-            if not all(np.isfinite(x).all() for x in found):
+            slopes = rows.slopes[name]  # (n, keys, components)
+            slopes = turned(rows.values[name], slopes) if name == QUATERNION else slopes
+            made.slopes[name] = np.ascontiguousarray(slopes.astype(float).transpose(0, 2, 1))
+            size = 1.0 if name == QUATERNION else float(np.abs(value).max()) or 1.0
+            made.noise[name] = _ROUNDING * size / self._sizes
+            if not (np.isfinite(value).all() and np.isfinite(made.slopes[name]).all()):
                 raise NotPredicted(f"{name} has no finite value at each observation")
         return made
 

@@ -21,12 +21,12 @@ from pydantic import PrivateAttr
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.row_rotations import turned
 from rigidsim.store.summary_parts import SummaryPart
-from rigidsim.workflows.fit.estimation import Solution, consider_covariance
+from rigidsim.workflows.fit.estimation import Ended, Solution, consider_covariance
 from rigidsim.workflows.fit.keys import FitKey, FitKeys
 from rigidsim.workflows.fit.observed import QUATERNION
 from rigidsim.workflows.fit.predictions import Prediction
 from rigidsim.workflows.fit.readings import Readings
-from rigidsim.workflows.fit.searching import FoundFit, Weighing
+from rigidsim.workflows.fit.searching import Weighing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -226,23 +226,23 @@ def digits_text(value: float, sigma: float) -> str:
 
 
 def result_of(
-    name: str, keys: FitKeys, weighing: Weighing, found: FoundFit, derivatives: str, told: Sequence[str],
-    along: Prediction, times: np.ndarray,
+    name: str, keys: FitKeys, weighing: Weighing, ended: Ended, costs: Sequence[float], derivatives: str,
+    told: Sequence[str], along: Prediction, times: np.ndarray,
 ) -> FitResult:  # fmt: skip
     """The result of a search, with its dataset and the fitted config.
 
     Args:
+        costs: sums of squares where each start ended.
         derivatives: where they came from. told: what a user should know besides.
         along: predictions with derivatives at times (s) along the run, as far as the scene has them.
     """
-    ended, count = found.ended, len(keys.estimated)
-    linear, solution, values = ended.linear, ended.solution, ended.values
+    linear, solution, values, count = ended.linear, ended.solution, ended.values, len(keys.estimated)
     known = np.array([one.sigma or 0.0 for one in keys.considered])
     covariance, sensitivity = consider_covariance(linear, solution, known)
     null = solution.null / solution.scales  # rows in the numbers' own units
     directions, parts = _directions(null, solution.scales, np.array([one.size for one in keys.estimated]))
     determined = ~parts.any(axis=0)
-    sets = list(zip(weighing.readings, weighing.used, found.compared.residuals, strict=True))
+    sets = list(zip(weighing.readings, weighing.used, linear.sets, strict=True))
     used = sum(int(u.sum()) * r.sigmas.shape[1] for r, u, _ in sets)
     freedom = used + int((linear.weights > 0).sum()) - count + len(null)
     scale = float(np.sqrt(linear.cost / freedom)) if freedom > 0 else None
@@ -278,7 +278,7 @@ def result_of(
                 data=readings.number, observable=readings.quantity.text, row=readings.rows[int(n)],
                 time=float(readings.times[n]), sigmas=float(size[n]),
             )
-            for (readings, kept, _), size in zip(sets, weighing.sizes(found.compared), strict=True)
+            for (readings, kept, _), size in zip(sets, weighing.sizes(linear.sets), strict=True)
             for n in np.flatnonzero(~kept)
         ],
         considered=[
@@ -291,10 +291,10 @@ def result_of(
         chi_square=linear.cost,
         freedom=freedom,
         scale=scale,
-        evaluations=ended.iterations,
-        starts=[_finite(cost) for cost in found.costs],
+        evaluations=ended.evaluations,
+        starts=[_finite(cost) for cost in costs],
         derivatives=derivatives,
-        told=[*told, *_counted_twice(weighing.readings), *found.told],
+        told=[*told, *_counted_twice(weighing.readings)],
     )  # fmt: skip
     known_words = {"long_name": "covariance with considered numbers; nan if undetermined"}
     square = ("parameter", "other_parameter")
