@@ -17,7 +17,7 @@ from rigidsim.model.inertia import MassDistribution
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.names import written
 from rigidsim.model.orbit_planes import OrbitPlane
-from rigidsim.model.placements.placement import Placement, SourcePlace
+from rigidsim.model.placements.placement import NOWHERE, Placement, SourcePlace
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.si import speaks_si
 from rigidsim.model.state_blocks import StateBlock
@@ -51,7 +51,7 @@ class Load(SceneLoad):
         remark: what readers should know of it besides its keys.
         reads: states that it must find: "attitude", "vertical", "flight".
         conservative: whether it has a potential that doesn't depend on time.
-        placement: how its source is placed, if it is placed by one.
+        placement: how its source is placed.
         orbit, table: what its source is on; all loads on one orbit or table share its states.
         corotating_orbit: circular and in a fixed plane, in whose frame its potential rests: there is Jacobi's
             constant.
@@ -75,7 +75,7 @@ class Load(SceneLoad):
     reads: frozenset[str] = frozenset()
     conservative = False
     remark: str = ""
-    placement: Placement | None = None
+    placement: Placement = NOWHERE
     orbit: KeplerOrbit | None = None
     table: TabulatedOrbit | None = None
     corotating_orbit: KeplerOrbit | None = None

@@ -194,7 +194,7 @@ def _each_once(loads: Sequence[Load]) -> list[str]:
     told = []
     for title, alike in kinds.items():
         # not what pictures tell: numbers that are looked at tell members of a sweep apart
-        sources = [name for load in alike if (name := getattr(getattr(load, "placement", None), "name", ""))]
+        sources = [name for load in alike if (name := load.placement.name)]
         of_which = ", ".join(sources) if len(sources) == len(alike) else f"{len(alike)} loads"
         told.append(f"{title} ({of_which})" if len(alike) > 1 else title)
     return told

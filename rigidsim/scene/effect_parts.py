@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -26,12 +26,20 @@ class EffectPart:
     missing: str = ""
 
 
-def degree_parts(degree: int | None, least: int) -> Iterator[EffectPart]:
-    """Each degree of the body's field that a source feels, from ``least`` on, with those above it."""
-    most, field_ = degree or least - 1, "of the body's field"
-    for n in range(most, least - 1, -1):
-        words = f"degrees {n} to {most}" if n < most else f"degree {n}"
-        wider = tuple(f"degree-{d}" for d in range(least, n))
-        yield EffectPart(f"degree-{n}", f"{words} {field_}", {"degree": n - 1}, wider)
-    if degree is None:
-        yield EffectPart("field", f"degree {least} and more {field_}", missing="no degree is given")
+def degree_parts(
+    degrees: Sequence[int],
+    words: str,
+    without: Callable[[int], Mapping[str, Any]],
+    prefix: str = "degree",
+    wider: tuple[str, ...] = (),
+) -> Iterator[EffectPart]:
+    """Each degree of a field together with those above it.
+
+    Args:
+        degrees: rising.
+        without: keys that leave out a degree and those above it.
+    """
+    for place, n in reversed(list(enumerate(degrees))):
+        which = f"degrees {n} to {degrees[-1]}" if n < degrees[-1] else f"degree {n}"
+        contain = *wider, *(f"{prefix}-{d}" for d in degrees[:place])
+        yield EffectPart(f"{prefix}-{n}", f"{which} {words}", without(n), contain)

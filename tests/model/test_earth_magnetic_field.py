@@ -69,7 +69,7 @@ def test_it_is_that_of_another_program(case: tuple[float, float, float, str]) ->
         rigidsim.parse(text(place=place, axes=f'axes = "{axes}"', epoch=f'epoch = "{day} TT"', end=1.0))
     )
     load = found.scene.given_loads[1]
-    field = np.array([float(x) for x in load.flux_density_at_start(found.scene)])
+    field = np.array([float(x) for x in load.field.at_start(found.scene)])
     expected = np.array(PPIGRF[case])
     # rounding of a sum of 195 terms in the other program, in double
     assert np.abs(1e9 * local @ field - expected).max() <= 1e-12 * np.linalg.norm(expected)
@@ -86,7 +86,7 @@ def test_its_expressions_turn_with_the_earth(degree: int) -> None:
     for later in (0, 5000):
         date = parse_epoch(day).after(Decimal(later))
         there = prepare(rigidsim.parse(text(load, epoch=f'epoch = "{date}"'))).scene
-        field = np.array([float(x) for x in there.given_loads[1].flux_density_at_start(there)])
+        field = np.array([float(x) for x in there.given_loads[1].field.at_start(there)])
         torque = np.cross(moment, matrix(q).T @ field)
         found = derivative(system, state, later)[:3]
         # rounding, and 5000 s of precession with 80 nT a year of secular variation

@@ -15,15 +15,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from operator import attrgetter
 from typing import Any, Self, TypeVar
 
 import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
-from rigidsim.model.load import Load, Term
+from rigidsim.model.load import Term
+from rigidsim.model.loads.placed import Placed
 from rigidsim.model.orbits.point_mass_states import Pull
-from rigidsim.model.placements.placement import Placement, SourcePlace
+from rigidsim.model.placements.placement import SourcePlace
 from rigidsim.model.placements.point_mass import AmongMasses
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.two_part import as_factor
@@ -36,34 +36,23 @@ from rigidsim.scene.scene import Scene
 PartT = TypeVar("PartT", bound="ByPlacedSource")
 
 
-def _of_placement(name: str) -> Any:
-    return property(attrgetter(f"placement.{name}"))
-
-
 @dataclass(frozen=True, kw_only=True)
-class ByPlacedSource(Load):
+class ByPlacedSource(Placed):
     """Base of what a source of gravity does.
 
     Attributes:
         gravitational_parameter: G M of the source, m^3/s^2 (mpf).
-        placement: where the source is.
         pulls: whether its force accelerates the body.
         beside: the attraction to second degree by the same source; None of that one.
     """
 
     gravitational_parameter: Any
-    placement: Placement
     pulls: bool = False
     beside: Attraction | None = None
 
-    orbit, table, sights = map(_of_placement, ("orbit", "table", "sights"))
-    axes, epoch, seconds_ahead = map(_of_placement, ("axes", "epoch", "seconds_ahead"))
-    plane, without_plane = map(_of_placement, ("plane", "without_plane"))
-    wide, of_time, conservative = map(_of_placement, ("wide", "of_time", "rests"))
-
     @property
-    def reads(self) -> frozenset[str]:  # type: ignore[override]
-        return frozenset({"attitude", "flight"} if self.placement.flies else {"attitude"})
+    def conservative(self) -> bool:  # type: ignore[override]
+        return self.placement.rests
 
     @property
     def reacts(self) -> bool:  # type: ignore[override]
@@ -80,35 +69,6 @@ class ByPlacedSource(Load):
 
     def among(self, masses: PointMasses) -> SceneLoad:
         return replace(self, placement=self.placement.among(masses))
-
-    # --- where its source is --------------------------------------------------------------------------------
-
-    def seen(self, m: Kinematics) -> tuple[list[Symbolic], SourcePlace]:
-        """``SourcePlace.line`` in body axes, and the place."""
-        place = self.placement.seen(m)
-        if m.attitude is not None and m.attitude.orbital is not None:
-            return m.attitude.orbital.direction, place
-        return m.seen(place.line), place
-
-    def source_direction(self, m: Kinematics) -> list[Symbolic]:
-        line, place = self.seen(m)
-        return [-x for x in line] if place.outward else line
-
-    def source_place(self, m: Kinematics) -> SourcePlace:
-        return self.placement.seen(m)
-
-    def source_at_start(self, scene: Scene) -> Vector:
-        return self.placement.at_start(scene)
-
-    def motion(self, m: Kinematics) -> list[Symbolic]:
-        """Velocity of a body in flight as seen from its source, space axes, units of speed."""
-        return self.placement.velocity(m)
-
-    def motion_at_start(self, scene: Scene) -> Vector:
-        return self.placement.velocity_at_start(scene)
-
-    def fastest_rate(self, scene: Scene) -> Any:
-        return self.placement.fastest_rate(scene)
 
     # --- what it does ---------------------------------------------------------------------------------------
 

@@ -131,7 +131,12 @@ class BodyField(ByPlacedSource):
 
     @staticmethod
     def effect_parts(fields: Any) -> Iterator[EffectPart]:
-        return degree_parts(fields.degree, LEAST)
+        field_ = "of the body's field"
+        degrees = range(LEAST, (fields.degree or 0) + 1)
+        yield from degree_parts(degrees, field_, lambda n: {"degree": n - 1})
+        if fields.degree is None:
+            words = f"degree {LEAST} and more {field_}"
+            yield EffectPart("field", words, missing="no degree is given")
 
     @classmethod
     def beside_of(cls, load: Any, fields: Any, around: Setting) -> Load | None:

@@ -72,10 +72,10 @@ class EddyCurrents(InMagneticField):
             moments = numbers(fields.magnetic_tensor, around)
         else:
             moments = [_of_sphere(fields, around)] * 3
-        return cls(moments=moments, **cls.field_of(fields, around))
+        return cls.within(fields, around, moments=moments)
 
     def acts(self) -> bool:
-        return any(x != 0 for x in self.moments) and any(x != 0 for x in self.source)
+        return any(x != 0 for x in self.moments) and any(x != 0 for x in self.field.source)
 
     def torque(self, m: Kinematics) -> list[Term]:
         """Sum over axes k, l of the constant vectors M_k e_k x e_l times (w x b)_k b_l, b the field over its
@@ -83,8 +83,8 @@ class EddyCurrents(InMagneticField):
         """
         if not self.acts():
             return []
-        context, b, terms = m.scene.context, self._field(m), []
-        scale, axes = context.ldexp(self._size(m.scene) ** 2, -m.scaling.momentum), unit_vectors(context)
+        context, b, terms = m.scene.context, self.b(m), []
+        scale, axes = context.ldexp(self.field.size(m.scene) ** 2, -m.scaling.momentum), unit_vectors(context)
         induced = cross(m.rates, b)
         for k, moment in enumerate(self.moments):
             for n, axis in enumerate(axes):
@@ -94,7 +94,7 @@ class EddyCurrents(InMagneticField):
         return terms
 
     def direction(self, scene: Scene) -> Vector | None:
-        return self.source if self.uniform else None
+        return self.field.source if self.field.uniform else None
 
     def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
         """False: it damps any spin across the field."""

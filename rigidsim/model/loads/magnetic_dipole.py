@@ -18,7 +18,6 @@ from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm, unit_vector
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import Constant, Expression, states_read
 from rigidsim.scene.fields import NumberOrFormula, Triple
-from rigidsim.scene.readable import number_text
 from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
 
@@ -47,43 +46,42 @@ class MagneticDipole(InMagneticField):
 
     @classmethod
     def resolve(cls, fields: MagneticDipoleFields, around: Setting) -> MagneticDipole:
-        found = cls.field_of(fields, around)
         if any(isinstance(x, str) for x in fields.moment):
             moment, law = [around.context.zero] * 3, tuple(_law(fields.moment, around))
-            return SteeredDipole(moment=moment, law=law, **found)
-        return cls(moment=numbers(fields.moment, around), **found)
+            return SteeredDipole.within(fields, around, moment=moment, law=law)
+        return cls.within(fields, around, moment=numbers(fields.moment, around))
 
     def acts(self) -> bool:
-        return any(x != 0 for x in self.moment) and any(x != 0 for x in self.source)
+        return any(x != 0 for x in self.moment) and any(x != 0 for x in self.field.source)
 
     @property
     def conservative(self) -> bool:  # type: ignore[override]
         """Whether the field is uniform: along a flight its torque does work without a force."""
-        return self.uniform or not self.acts()
+        return self.field.uniform or not self.acts()
 
     def _moment(self, m: Kinematics) -> Vector:
         """m times the field's size, internal units of energy."""
-        size, exponent = self._size(m.scene), -m.scaling.energy
+        size, exponent = self.field.size(m.scene), -m.scaling.energy
         return [m.scene.context.ldexp(x * size, exponent) for x in self.moment]
 
     def torque(self, m: Kinematics) -> list[Term]:
         if not self.acts():
             return []
         moment, axes = self._moment(m), unit_vectors(m.scene.context)
-        return [(cross(moment, axis), b) for axis, b in zip(axes, self._field(m), strict=True)]
+        return [(cross(moment, axis), b) for axis, b in zip(axes, self.b(m), strict=True)]
 
     def potential(self, m: Kinematics) -> Symbolic | None:
         if not self.acts():
             return None
-        pairs = zip(self._moment(m), self._field(m), strict=True)
+        pairs = zip(self._moment(m), self.b(m), strict=True)
         return -hy.sum([m.number(x) * b for x, b in pairs if x != 0])
 
     def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
-        return (self.moment, self.source) if self.uniform else None
+        return (self.moment, self.field.source) if self.field.uniform else None
 
     def amplitude(self, scene: Scene) -> Any:
         """Largest 2 m B."""
-        return 2 * norm(scene.context, self.moment) * self.most(scene)
+        return 2 * norm(scene.context, self.moment) * self.field.most(scene)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +92,7 @@ class SteeredDipole(MagneticDipole):
     conservative = False
 
     def acts(self) -> bool:
-        return any(x != 0 for x in self.source)
+        return any(x != 0 for x in self.field.source)
 
     def read_by(self, names: frozenset[str]) -> bool:
         return False
@@ -104,8 +102,8 @@ class SteeredDipole(MagneticDipole):
         return super().reads | states_read(*self.law)
 
     def torque(self, m: Kinematics) -> list[Term]:
-        size = m.scene.context.ldexp(self._size(m.scene), -m.scaling.energy)
-        return list(zip(diagonal([size] * 3), cross(written(m, self.law), self._field(m)), strict=True))
+        size = m.scene.context.ldexp(self.field.size(m.scene), -m.scaling.energy)
+        return list(zip(diagonal([size] * 3), cross(written(m, self.law), self.b(m)), strict=True))
 
     def potential(self, m: Kinematics) -> Symbolic | None:
         return None
@@ -115,13 +113,6 @@ class SteeredDipole(MagneticDipole):
 
     def amplitude(self, scene: Scene) -> Any | None:
         return None
-
-
-def _text(component: Expression) -> str:
-    """A component as written; a number has no text of its own."""
-    if isinstance(component, Constant) and not component.text:
-        return number_text(float(component.value), 6)
-    return component.text
 
 
 def _law(given: list[Any], around: Setting) -> Iterator[Expression]:

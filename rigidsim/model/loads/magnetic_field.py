@@ -9,25 +9,26 @@ import random
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import Annotated, Any, ClassVar, Literal, cast
+from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
 import heyoka as hy
 from pydantic import Field, StrictInt, Tag
 
-from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.load import Load, loads_of
 from rigidsim.model.load_words import length_text, value_text
-from rigidsim.model.loads.attraction import Attraction
-from rigidsim.model.placements.placement import SourcePlace
-from rigidsim.model.rotations import Symbolic
+from rigidsim.model.loads.gravity import CentralGravity, CentralGravityFields
+from rigidsim.model.loads.placed import Placed
+from rigidsim.model.placements.flight import FlownAbout
+from rigidsim.model.placements.placement import NOWHERE, Placement
+from rigidsim.model.placements.prescribed_orbit import PlacedOnOrbit
+from rigidsim.model.rotations import Symbolic, along
 from rigidsim.model.sources import free_flight, in_body_axes, read_in
 from rigidsim.model.turning_harmonics import TurningHarmonics
-from rigidsim.model.two_part import rounded
+from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.arithmetic import Vector, apply, dot, norm, transpose
 from rigidsim.scene.bodies.presets import EARTH
 from rigidsim.scene.earth_axes import earth_axes, rotation_rate
-from rigidsim.scene.effect_parts import EffectPart
+from rigidsim.scene.effect_parts import EffectPart, degree_parts
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import PLACES, NameProvider, Readable, provides
@@ -44,7 +45,7 @@ from rigidsim.scene.fields import (
 )
 from rigidsim.scene.geomagnetic_field import MOST, RADIUS, igrf
 from rigidsim.scene.orbit_keys import OrbitFields
-from rigidsim.scene.orbits import KeplerOrbit, resolve_orbit
+from rigidsim.scene.orbits import resolve_orbit
 from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
@@ -132,9 +133,8 @@ def _refuse_elsewhere(fields: MagneticFieldFields, around: Setting) -> None:
     if fields.field_degree is not None and fields.field != IGRF:
         raise around.fault("field_degree", f'given without field = "{IGRF}", whose degree it is; remove it')
     if fields.elements is None and fields.gravitational_parameter is not None:
-        raise around.fault(
-            "gravitational_parameter", "given without an orbit, whose period it is for; remove it"
-        )
+        what = "given without an orbit, whose period it is for; remove it"
+        raise around.fault("gravitational_parameter", what)
     if fields.of_place and fields.elements is None and not around.free_flight:
         key = "field" if fields.field == IGRF else "source_moment"
         what = (
@@ -148,8 +148,77 @@ def _refuse_elsewhere(fields: MagneticFieldFields, around: Setting) -> None:
         raise around.fault("position", what)
 
 
+# --- fields -------------------------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True)
-class EarthField:
+class UniformField:
+    """A field that is the same everywhere.
+
+    Attributes:
+        source: the field itself, T; of others the moment M of their dipole, A m^2; space axes (mpf).
+        placement: of its source.
+    """
+
+    source: Vector
+    placement: Placement = NOWHERE
+
+    @property
+    def uniform(self) -> bool:
+        """Whether it is the same everywhere."""
+        return self.placement is NOWHERE
+
+    def size(self, scene: Scene) -> Any:
+        """Of its order, T (mpf)."""
+        return norm(scene.context, self.source)
+
+    def most(self, scene: Scene) -> Any:
+        """Its largest size, T (mpf)."""
+        return self.size(scene)
+
+    def over_size(self, m: Kinematics) -> list[Symbolic]:
+        """B over ``size``, space axes."""
+        length = norm(m.scene.context, self.source)
+        return m.fixed([x / length for x in self.source])
+
+    def at_start(self, scene: Scene) -> Vector:
+        """B at the start, space axes, T (mpf)."""
+        return self.source
+
+
+class DipoleField(UniformField):
+    """Of a centred dipole M, B = (mu_0 / 4 pi r^3) (3 (M . c) c - M) in direction c (Jackson, Classical
+    Electrodynamics, section 5.6).
+    """
+
+    def _far(self, scene: Scene) -> Any:
+        """The semi-major axis, or the distance at the start, m."""
+        orbit = self.placement.orbit
+        return norm(scene.context, self.placement.at_start(scene)) if orbit is None else orbit.semi_major_axis
+
+    def size(self, scene: Scene) -> Any:
+        """Over its equator."""
+        return scene.context.mpf(_FIELD_CONSTANT) * super().size(scene) / self._far(scene) ** 3
+
+    def most(self, scene: Scene) -> Any:
+        """Over its poles at the closest approach."""
+        return 2 * self.size(scene) * (self._far(scene) / self.placement.nearest(scene)) ** 3
+
+    def over_size(self, m: Kinematics) -> list[Symbolic]:
+        unit, place = super().over_size(m), self.placement.seen(m)
+        falling = (as_factor(m.number(self._far(m.scene) / place.unit)) * place.inverse) ** 3
+        across = 3.0 * along(unit, place.line)
+        return [falling * (across * x - e) for e, x in zip(unit, place.line, strict=True)]
+
+    def at_start(self, scene: Scene) -> Vector:
+        place, context = self.placement.at_start(scene), scene.context
+        far = norm(context, place)
+        across, size = dot(self.source, place) / far, context.mpf(_FIELD_CONSTANT) / far**3
+        return [size * (3 * across * x / far - e) for e, x in zip(self.source, place, strict=True)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class EarthField(DipoleField):
     """The Earth's field: coefficients (T) at the epoch, in axes that turn with the Earth.
 
     Its potential is a sum c_n r^-(n+1) f_n with Schmidt semi-normalized coefficients (Alken et al. 2021,
@@ -158,109 +227,119 @@ class EarthField:
         B = sum (R/r)^(n+2) ((n + 1) f_n u + u x (u x grad f_n)).
 
     Attributes:
-        harmonics: unnormalized, with the Earth's axes at time 0 and its rate.
+        harmonics: unnormalized, with the Earth's axes at time 0 and its rate; degree 1 is the dipole.
         epoch: the date.
     """
 
     harmonics: TurningHarmonics
     epoch: Epoch
 
-    @classmethod
-    def of(cls, degree: int | None, around: Setting) -> EarthField:
-        """The field to a degree; refused where date and axes aren't known."""
-        axes = around.axes or (around.ephemeris.axes if around.ephemeris is not None else None)
-        epoch, context = around.epoch, around.context
-        known = (
-            ("[time] epoch", epoch, 'epoch = "2026-01-01T00:00:00 UTC"'),
-            ("[frame] axes", axes, 'axes = "ICRF"'),
-        )
-        for what, found, example in known:
-            if found is None:
-                why = f'given "{IGRF}", which turns with the Earth and takes {what}; give {example}'
-                raise around.fault("field", why)
-        assert epoch is not None
-        assert axes is not None
-        try:
-            given = igrf(epoch, degree or MOST)
-            for second in (around.start, around.end):
-                igrf(epoch.uniform().after(Decimal(round(plain(second)))), 1)
-            frame = earth_axes(epoch, axes, context)
-        except ValueError as error:
-            why = f'given "{IGRF}" for a run from {epoch}; {error}: a run within 1970 to 2029 is allowed'
-            raise around.fault("field", why) from None
-        coefficients = {}
-        for (n, m, sine), value in given.items():
-            tesla = ExactNumber(value / 10**9).at(context)
-            share = context.mpf(math.factorial(n - m)) / math.factorial(n + m)
-            if value:
-                coefficients[n, m, sine] = tesla * (context.sqrt(2 * share) if m else 1)
-        radius = context.mpf(RADIUS)
-        harmonics = TurningHarmonics(coefficients, radius, frame, rotation_rate(context))
-        return cls(harmonics, epoch)
-
-    def dipole(self, constant: Any) -> Vector:
-        """The magnetic moment of degree 1 at time 0, space axes, A m^2 (mpf).
-
-        Args:
-            constant: mu_0 / 4 pi.
-        """
-        c = self.harmonics.coefficients
-        size = self.harmonics.radius**3 / constant
-        moment = [size * c[key] for key in ((1, 1, False), (1, 1, True), (1, 0, False))]
-        return apply(transpose(self.harmonics.frame), moment)
-
-    def over(self, m: Kinematics, centre: Vector, size: Any) -> list[Symbolic]:
-        """B over a size (mpf, T), space axes."""
-        which = IGRF, self.epoch, self.harmonics.degree, *centre, size
+    def over_size(self, m: Kinematics) -> list[Symbolic]:
+        size = self.size(m.scene)
+        which = IGRF, self.epoch, self.harmonics.degree, *m.carried(self.placement.point), size
         if which not in m.made:
-            unit = m.scene.context.ldexp(m.scene.context.one, m.scaling.length)
-            ratio = self.harmonics.radius / unit
-            m.made[which] = self.harmonics.vector(m, m.seen_from(centre), lambda n: ratio ** (n + 2) / size)
+            place = self.placement.seen(m)
+            ratio = self.harmonics.radius / place.unit
+            seen = place.line, place.inverse
+            m.made[which] = self.harmonics.vector(m, seen, lambda n: ratio ** (n + 2) / size)
         return m.made[which]
 
-    def within(self, far: Any) -> bool:
-        """Whether a distance from the centre is inside the Earth."""
-        return bool(far < _LEAST * self.harmonics.radius)
+    def at_start(self, scene: Scene) -> Vector:
+        place = [-x for x in self.placement.at_start(scene)]
+        return self.harmonics.at(scene.context, place, scene.start)
+
+
+def field_of(fields: MagneticFieldFields, around: Setting) -> UniformField:
+    """The field that the keys describe."""
+    _refuse_elsewhere(fields, around)
+    if not fields.of_place:
+        return UniformField(numbers(cast("list[ExactNumber]", fields.field), around))
+    if fields.field == IGRF:
+        return _earth_field(fields.field_degree, _flown_about(fields, around), around)
+    placement = _flown_about(fields, around) if around.free_flight else _on_orbit(fields, around)
+    return DipoleField(numbers(fields.source_moment or [], around), placement)
+
+
+def _on_orbit(fields: MagneticFieldFields, around: Setting) -> PlacedOnOrbit:
+    elements, given = fields.elements, fields.gravitational_parameter
+    assert elements is not None
+    for key in ("body", "table"):
+        if getattr(elements, key, None) is not None:
+            what = f"given for a {fields.kind}, which takes elements alone; gravity_gradient takes a "
+            raise around.fault(f"{elements.key}.{key}", what + key)
+    return PlacedOnOrbit(resolve_orbit(elements, None if given is None else given.at(around.context), around))
+
+
+def _flown_about(fields: MagneticFieldFields, around: Setting) -> FlownAbout:
+    """Place of the dipole about which the body flies: as given, or the one point that attracts the body."""
+    given = ((n, x) for n, x in enumerate(around.config.loads) if isinstance(x, CentralGravityFields))
+    pulling = [CentralGravity.resolve(x, around.at("loads", n)) for n, x in given]
+    points = [load.attracting_point for load in pulling if load.attracting_point is not None]
+    centre = points[0] if points else []
+    if fields.position is not None:
+        centre = numbers(fields.position, around)
+    elif not points or any(point != centre for point in points):
+        what = "several points" if points else "no point at rest"
+        what = f"missing; it is needed where {what} attracts the body by central_gravity"
+        raise around.fault("position", what)
+    strengths = [load.gravitational_parameter for load in pulling if load.attracting_point == centre]
+    other = next((x for x in strengths if not EARTH.attracts_by(x)), None)
+    if fields.field == IGRF and other is not None:
+        what = f'given "{IGRF}", the Earth\'s, where {value_text(other, "m^3/s^2")} attracts the body, which '
+        what += f"isn't the Earth; give source_moment, or {EARTH.gravitational_parameter:g} m^3/s^2"
+        raise around.fault("field", what)
+    if centre == around.position:
+        raise around.fault("position", "the body starts at the dipole; start it elsewhere")
+    return FlownAbout(strengths[0] if len(strengths) == 1 else None, centre)
+
+
+def _earth_field(degree: int | None, placement: FlownAbout, around: Setting) -> EarthField:
+    """The Earth's field to a degree; refused where date and axes aren't known, or inside the Earth."""
+    axes = around.axes or (around.ephemeris.axes if around.ephemeris is not None else None)
+    epoch, context = around.epoch, around.context
+    given = f'given "{IGRF}", '
+    if epoch is None or axes is None:
+        what = '[time] epoch; give epoch = "2026-01-01T00:00:00 UTC"'
+        what = what if epoch is None else '[frame] axes; give axes = "ICRF"'
+        raise around.fault("field", f"{given}which turns with the Earth and takes {what}")
+    try:
+        gauss = igrf(epoch, degree or MOST)
+        for second in (around.start, around.end):
+            igrf(epoch.uniform().after(Decimal(round(plain(second)))), 1)
+        frame = earth_axes(epoch, axes, context)
+    except ValueError as error:
+        why = f"{given}for a run from {epoch}; {error}: a run within 1970 to 2029 is allowed"
+        raise around.fault("field", why) from None
+    c = {}
+    for (n, m, sine), value in gauss.items():
+        share = context.mpf(math.factorial(n - m)) / math.factorial(n + m)
+        if value:
+            size = context.sqrt(2 * share) if m else 1
+            c[n, m, sine] = ExactNumber(value / 10**9).at(context) * size
+    radius, far = context.mpf(RADIUS), norm(context, placement.at_start(around))
+    if far < _LEAST * radius:
+        there = length_text(float(plain(far)))
+        what = f"{given}the Earth's, but the body starts {there} from its centre, inside it; check "
+        raise around.fault("field", what + "[initial] position and its unit")
+    dipole = [
+        radius**3 / context.mpf(_FIELD_CONSTANT) * c[1, *key] for key in ((1, False), (1, True), (0, False))
+    ]
+    harmonics = TurningHarmonics(c, radius, frame, rotation_rate(context))
+    return EarthField(apply(transpose(frame), dipole), placement, harmonics=harmonics, epoch=epoch)
 
 
 @dataclass(frozen=True, kw_only=True)
-class InMagneticField(Load):
-    """Base of loads by a magnetic field (Jackson, Classical Electrodynamics, sections 5.6 and 5.7).
+class InMagneticField(Placed):
+    """Base of loads by a magnetic field."""
 
-    The field of a centred dipole M is B = (mu_0 / 4 pi r^3) (3 (M . c) c - M) in direction c. The ``place``
-    of the dipole about which the body flies (space axes, m) is empty where it is the point that attracts it.
-    """
-
-    source: Vector  # the field itself (T), or M (A m^2) of a dipole; space axes
-    orbit: KeplerOrbit | None = None  # of the source seen from the body (which only reverses c)
-    place: Vector | None = None  # None if it doesn't fly about a dipole
-    name: str = ""
-    earth: EarthField | None = None  # whose field it is; the source is then its dipole at time 0
+    field: UniformField
+    name: str
 
     @classmethod
-    def field_of(cls, fields: MagneticFieldFields, around: Setting) -> dict[str, Any]:
-        """What the keys say of the field, worked out: source, orbit, place and name."""
-        flies = around.free_flight and fields.of_place
-        _refuse_elsewhere(fields, around)
-        strength, context = fields.gravitational_parameter, around.context
-        found: dict[str, Any] = {"name": fields.name or ""}
-        if fields.field == IGRF:
-            earth = EarthField.of(fields.field_degree, around)
-            found |= {"earth": earth, "source": earth.dipole(context.mpf(_FIELD_CONSTANT))}
-        else:
-            found["source"] = numbers(fields.source_moment or cast("list[ExactNumber]", fields.field), around)
-        if flies:
-            found["place"] = numbers(fields.position or [], around)
-            if found["place"] == around.position:
-                raise around.fault("position", "the body starts at the dipole; start it elsewhere")
-        elif fields.elements is not None:
-            motion = None if strength is None else strength.at(context)
-            for key in ("body", "table"):
-                if getattr(fields.elements, key, None) is not None:
-                    what = f"given for a {fields.kind}, which takes elements alone; gravity_gradient takes a "
-                    raise around.fault(f"{fields.elements.key}.{key}", what + key)
-            found["orbit"] = resolve_orbit(fields.elements, motion, around)
-        return found
+    def within(cls, fields: MagneticFieldFields, around: Setting, **more: Any) -> Self:
+        """The load in the field that the keys describe."""
+        field = field_of(fields, around)
+        return cls(field=field, placement=field.placement, name=fields.name or "", **more)
 
     @staticmethod
     def effect_parts(fields: MagneticFieldFields) -> Iterator[EffectPart]:
@@ -268,13 +347,8 @@ class InMagneticField(Load):
         if fields.field != IGRF:
             yield EffectPart("igrf", "the Earth's magnetic field", missing=f'field isn\'t "{IGRF}"')
             return
-        most = fields.field_degree or MOST
-        for n in range(most, 1, -1):
-            words = f"degrees {n} to {most}" if n < most else f"degree {n}"
-            wider = tuple(f"field-degree-{d}" for d in range(2, n))
-            yield EffectPart(
-                f"field-degree-{n}", f"{words} of the Earth's magnetic field", {"field_degree": n - 1}, wider
-            )
+        degrees, words = range(2, (fields.field_degree or MOST) + 1), "of the Earth's magnetic field"
+        yield from degree_parts(degrees, words, lambda n: {"field_degree": n - 1}, "field-degree")
 
     def read_by(self, names: frozenset[str]) -> bool:
         """On an orbit, whose states it brings: its field, or names of its source."""
@@ -283,145 +357,26 @@ class InMagneticField(Load):
 
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
-        if not self.acts():
-            return frozenset()
-        return frozenset({"attitude"} if self.place is None else {"attitude", "flight"})
-
-    @property
-    def uniform(self) -> bool:
-        """Whether the field is the same everywhere."""
-        return self.orbit is None and self.place is None
+        return super().reads if self.acts() else frozenset()
 
     @property
     def wide(self) -> bool:  # type: ignore[override]
         """Whether its expressions are too long to be unrolled: those of an Earth that turns take seconds."""
-        return self.earth is not None
+        return isinstance(self.field, EarthField)
 
     @property
     def has_source(self) -> bool:  # type: ignore[override]
         return self.orbit is not None
 
-    def source_direction(self, m: Kinematics) -> list[Symbolic] | None:
-        return None if self.orbit is None else m.seen(m.orbit(self.orbit).direction)
-
-    # --- its field, and where it is from --------------------------------------------------------------------
-
-    def source_place(self, m: Kinematics) -> SourcePlace:
-        if self.orbit is not None:
-            orbit = m.orbit(self.orbit)
-            return SourcePlace(orbit.direction, orbit.inverse_distance, self.orbit.semi_major_axis)
-        outward, inverse = m.seen_from(self._centre(m.scene))
-        unit = m.scene.context.ldexp(m.scene.context.one, m.scaling.length)
-        return SourcePlace([-x for x in outward], inverse, unit)
-
-    def source_at_start(self, scene: Scene) -> Vector:
-        if self.orbit is not None:
-            return self.orbit.place(scene.context, scene.start)
-        return [a - x for x, a in zip(scene.position or [], self._centre(scene), strict=True)]
+    def b(self, m: Kinematics) -> list[Symbolic]:
+        """The field over its size, body axes."""
+        return m.seen(self.field.over_size(m))
 
     def flux_density(self, m: Kinematics) -> list[Symbolic]:
-        if all(x == 0 for x in self.source):
+        if all(x == 0 for x in self.field.source):
             return [hy.expression(0.0)] * 3
-        size = rounded(m.number(self._size(m.scene)))
-        return [size * x for x in self._field(m)]
-
-    def flux_density_at_start(self, scene: Scene) -> Vector:
-        if self.uniform:
-            return self.source
-        place, context = self.source_at_start(scene), scene.context
-        if self.earth is not None:
-            return self.earth.harmonics.at(context, [-x for x in place], scene.start)
-        far = norm(context, place)
-        along, size = dot(self.source, place) / far, context.mpf(_FIELD_CONSTANT) / far**3
-        return [size * (3 * along * x / far - e) for e, x in zip(self.source, place, strict=True)]
-
-    def same_field(self, other: object) -> bool:
-        """Whether another load gives the same field once more."""
-        own = self.source, self.orbit, self.place, self.earth
-        return isinstance(other, InMagneticField) and own == (
-            other.source, other.orbit, other.place, other.earth,
-        )  # fmt: skip
-
-    def most(self, scene: Scene) -> Any:
-        """Largest field, T: of a dipole over its poles at pericentre."""
-        size = self._size(scene)
-        if self.uniform:
-            return size
-        if self.orbit is None:
-            return 2 * size * (self._far(scene) / self._nearest(scene)) ** 3
-        return 2 * size * (self.orbit.semi_major_axis / self.orbit.pericentre) ** 3
-
-    def _size(self, scene: Scene) -> Any:
-        """Size of the field, T; of a dipole's, over its equator at the semi-major axis or at the start."""
-        size = norm(scene.context, self.source)
-        if self.uniform:
-            return size
-        far = self._far(scene) if self.orbit is None else self.orbit.semi_major_axis
-        return scene.context.mpf(_FIELD_CONSTANT) * size / far**3
-
-    def _centre(self, scene: Scene) -> Vector:
-        """Position of the dipole about which the body flies, m; refused if it isn't told."""
-        if self.place:
-            return self._checked(self.place, scene)
-        points = [load.attracting_point for load in loads_of(scene) if load.attracting_point is not None]
-        if not points or any(point != points[0] for point in points):
-            found = "several points" if points else "no point at rest"
-            what = f"missing; it is needed where {found} attracts the body by central_gravity"
-            raise ConfigError(Problem(f"[[loads]] {self.title} position", what))
-        return self._checked(points[0], scene)
-
-    def _checked(self, centre: Vector, scene: Scene) -> Vector:
-        """The place; refused where the Earth's field is that of another body, or the body starts inside."""
-        if self.earth is None:
-            return centre
-        where, given = f"[[loads]] {self.title} field", f'given "{IGRF}", the Earth\'s, '
-        for load in loads_of(scene):
-            if not isinstance(load, Attraction) or load.attracting_point != centre:
-                continue
-            if not EARTH.attracts_by(strength := load.gravitational_parameter):
-                what = f"where {value_text(strength, 'm^3/s^2')} attracts the body, which isn't the "
-                what += f"Earth; give source_moment, or {EARTH.gravitational_parameter:g} m^3/s^2"
-                raise ConfigError(Problem(where, given + what))
-        far = norm(scene.context, [x - a for x, a in zip(scene.position or [], centre, strict=True)])
-        if self.earth.within(far):
-            what = f"but the body starts {length_text(float(plain(far)))} from its centre, inside it; check "
-            raise ConfigError(Problem(where, f"{given}{what}[initial] position and its unit"))
-        return centre
-
-    def _far(self, scene: Scene) -> Any:
-        """Distance from the dipole at the start, m."""
-        pairs = zip(scene.position or [], self._centre(scene), strict=True)
-        return norm(scene.context, [x - a for x, a in pairs])
-
-    def _nearest(self, scene: Scene) -> Any:
-        """Least distance from the dipole, m: that of the Kepler orbit about it, or the start's."""
-        loads, centre = loads_of(scene), self._centre(scene)
-        pulling = [x for x in loads if isinstance(x, Attraction) and x.attracting_point == centre]
-        return pulling[0].placement.nearest(scene) if len(pulling) == 1 else self._far(scene)
-
-    def _field(self, m: Kinematics) -> list[Symbolic]:
-        """Field B divided by ``_size``, body axes."""
-        length = norm(m.scene.context, self.source)
-        unit = m.fixed([x / length for x in self.source])
-        if self.uniform:
-            return m.seen(unit)
-        if self.earth is not None:
-            return m.seen(self.earth.over(m, self._centre(m.scene), self._size(m.scene)))
-        if self.orbit is None:
-            c, inverse = m.seen_from(self._centre(m.scene))
-            falling = (m.number(m.scene.context.ldexp(self._far(m.scene), -m.scaling.length)) * inverse) ** 3
-        else:
-            place = m.orbit(self.orbit)
-            c, falling = place.direction, place.inverse_distance**3
-        along = 3.0 * hy.sum([e * x for e, x in zip(unit, c, strict=True)])
-        space = [falling * (along * x - e) for e, x in zip(unit, c, strict=True)]
-        return m.seen(space)
-
-    def fastest_rate(self, scene: Scene) -> Any:
-        """Angular rate at pericentre, rad/s; in flight that at the start."""
-        if self.place is not None:
-            return norm(scene.context, scene.velocity or []) / self._far(scene)
-        return scene.context.zero if self.orbit is None else self.orbit.fastest_rate(scene.context)
+        size = rounded(m.number(self.field.size(m.scene)))
+        return [size * x for x in self.b(m)]
 
 
 @provides
@@ -442,7 +397,7 @@ class FieldNames(NameProvider):
         """See ``NameProvider``."""
         if not read_in(scene) & set(FIELD_NAMES):
             return {}
-        found = [load.flux_density_at_start(scene) for load in _fields_of(scene)]
+        found = [load.field.at_start(scene) for load in _fields_of(scene)]
         return dict(zip(FIELD_NAMES, in_body_axes(scene, _total(found)), strict=True))
 
     def at_random(
@@ -467,6 +422,6 @@ def _total(vectors: list[list[Any]]) -> list[Any]:
 def _fields_of(scene: Scene) -> list[InMagneticField]:
     found: list[InMagneticField] = []
     for load in scene.given_loads:
-        if isinstance(load, InMagneticField) and not any(load.same_field(x) for x in found):
+        if isinstance(load, InMagneticField) and not any(load.field == x.field for x in found):
             found.append(load)
     return found

@@ -24,7 +24,7 @@ from rigidsim.model.loads.source_figure import refuse_inside
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.turning_harmonics import TurningHarmonics, frame_of
 from rigidsim.scene.bodies.gravity_field import HarmonicsTable
-from rigidsim.scene.effect_parts import EffectPart
+from rigidsim.scene.effect_parts import EffectPart, degree_parts
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import Angle, Dimensionless, Direction, Metre, Positive, Rate
 from rigidsim.scene.registry import Setting, register_load
@@ -107,17 +107,14 @@ class SourceField(ByPlacedSource):
     def effect_parts(fields: Any) -> Iterator[EffectPart]:
         table = fields.gravity_field
         given = [(name, key) for name in ("C", "S") for key in getattr(table, name, ())]
-        keys = [(int(key.partition(",")[0]), f"{name}.{key}") for name, key in given]
-        most, wider = max((n for n, _ in keys), default=0), ["field"]
-        parts = []
-        for n in sorted({n for n, _ in keys})[1:]:
-            without = {f"gravity_field.{key}": None for degree, key in keys if degree >= n}
-            which = f"degrees {n} to {most}" if n < most else f"degree {n}"
-            parts.append(EffectPart(f"field-degree-{n}", f"{which} of that gravity", without, tuple(wider)))
-            wider.append(f"field-degree-{n}")
-        yield from reversed(parts)
-        words, missing = (
-            "gravity of the attracting body beyond a point",
-            "" if table else "no gravity_field is given",
+        keys = [(int(key.partition(",")[0]), f"gravity_field.{name}.{key}") for name, key in given]
+        yield from degree_parts(
+            sorted({n for n, _ in keys})[1:],
+            "of that gravity",
+            lambda n: dict.fromkeys(key for degree, key in keys if degree >= n),
+            "field-degree",
+            ("field",),
         )
+        missing = "" if table else "no gravity_field is given"
+        words = "gravity of the attracting body beyond a point"
         yield EffectPart("field", words, {"gravity_field": None}, missing=missing)

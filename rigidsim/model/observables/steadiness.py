@@ -31,8 +31,7 @@ def _turns_about_its_figure(m: Mechanics) -> bool:
 
 
 def _moves(load: Load) -> bool:
-    moves = load.placement is not None and load.placement.moves
-    return bool(load.orbit or load.table or moves or load.reacts)
+    return bool(load.orbit or load.table or load.placement.moves or load.reacts)
 
 
 def is_planet(m: Mechanics) -> bool:

@@ -40,7 +40,7 @@ class FlownBy(Placement):
 
 @dataclass(frozen=True)
 class FlownAbout(FlownBy):
-    """A point at rest with a gravitational parameter (mpf, m^3/s^2)."""
+    """A point at rest with a gravitational parameter (mpf, m^3/s^2); None if it doesn't attract the body."""
 
     gravitational_parameter: Any
     point: Vector  # m (mpf)
@@ -60,9 +60,14 @@ class FlownAbout(FlownBy):
 
     def nearest(self, scene: Setting) -> Any:
         place = [-x for x in self.at_start(scene)]
+        if self.gravitational_parameter is None:
+            return norm(scene.context, place)
         return closest(scene.context, place, scene.velocity or [], self.gravitational_parameter)[0]
 
     def fastest_rate(self, scene: Setting) -> Any:
+        """At the closest approach; the most that the speed allows at the start without attraction."""
+        if self.gravitational_parameter is None:
+            return norm(scene.context, scene.velocity or []) / self.nearest(scene)
         momentum = norm(scene.context, cross(self.at_start(scene), scene.velocity or []))
         return momentum / self.nearest(scene) ** 2
 

@@ -182,3 +182,7 @@ class Placement:
     def reaction(self, m: Kinematics, pull: list[Symbolic], sign: int) -> list[Pull]:
         """Accelerations of point masses where it accelerates the body by ``sign`` times ``pull``."""
         return []
+
+
+NOWHERE = Placement()
+"""Of loads without a source at a known place."""
