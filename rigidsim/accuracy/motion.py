@@ -57,7 +57,7 @@ def run_pilot(
     """
     # past the last of its pieces a motion may be one in which nothing happens, with steps of any length
     near_end = skip is not None and stepper.system.pieces is not None
-    chunk, skip = 1 if near_end else chunk, skip or stepper.skip
+    chunk, skip = 1 if near_end else chunk, skip or stepper.take
     begin, end = float(clock.start), float(clock.at(clock.count - 1))
     going = not warming or skip(warming)
     warm, spent = stepper.steps, 0.0

@@ -42,7 +42,7 @@ def closing_words(prepared: InitialValueProblem, progress: Progress, parts: Asse
     text += f"; last good state at {words.moment(progress.time)} after {progress.steps} steps"
     if progress.last_good is None:
         return text
-    state = np.array([progress.last_good.mark.state], dtype=prepared.precision.scalar)
+    state = np.array([progress.last_good.state], dtype=prepared.precision.scalar)
     factors = parts.evaluator.singular_factors(state, np.array([parts.stepper.chart]))  # where it stands
     if factors is not None and abs(float(factors[0])) < NEAR_SINGULAR:
         middle = float(state[0][prepared.system.states.index("theta")])

@@ -98,7 +98,7 @@ class _ActiveRun:
         guards = Guards(prepared, statistics, self.interruption, session.observer)
         most = prepared.scene.config.limits.max_steps  # of natural steps; it starts anew in each session
         if most is not None and start is not None:
-            most += start.boundary.mark.steps
+            most += start.steps
         pacing = session.tuning.pacing
         self.driver = sampler(prepared, parts, self.recorder, guards, start, pacing, most, progress)
         if start is not None:

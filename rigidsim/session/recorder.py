@@ -6,7 +6,7 @@ Statistics over all samples let the end of a run be judged without reading them 
 import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -15,7 +15,6 @@ from rigidsim.errors import RunFolderError
 from rigidsim.session.dataset import dates_of, drift_name, published_of, put_back_name
 from rigidsim.solve.assembly import Assembly
 from rigidsim.solve.checkpoint import Arrays, SavedPart, check_versions, numbers, pack_versions
-from rigidsim.solve.corrected_stepper import Position
 from rigidsim.solve.effects.waypoints import SampleTrail
 from rigidsim.solve.evaluate import Evaluator, RecordedParts
 from rigidsim.solve.events import pack_events, unpack_events
@@ -23,6 +22,7 @@ from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import put_back_by_invariant
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
+from rigidsim.solve.stepper import Mark
 from rigidsim.store import netcdf
 from rigidsim.store.netcdf import CHUNK_ROWS
 from rigidsim.store.run import MemoryWriter
@@ -136,9 +136,9 @@ class Checkpoints:
         self._parts: dict[str, SavedPart] = {"continuity": parts.evaluator, **others}
         self._versions = self._corrected.versions | {name: part.version for name, part in self._parts.items()}
 
-    def packed(self, position: Position) -> Arrays:
+    def packed(self, position: Mark) -> Arrays:
         """Everything at a position, as arrays."""
-        arrays = self._corrected.pack(position.boundary)
+        arrays = self._corrected.pack(position)
         samples = self._rows.samples(position.next_row)
         arrays["counts"] = np.append(arrays["counts"], samples)
         arrays["rows_between"] = np.array([position.next_row - self._rows.row(samples - 1) if samples else 0])
@@ -146,11 +146,11 @@ class Checkpoints:
             arrays |= part.pack()
         return arrays | pack_versions(self._versions)
 
-    def events(self, position: Position, first: int = 0) -> Arrays:
+    def events(self, position: Mark, first: int = 0) -> Arrays:
         """Crossings from number ``first`` on up to a position; later ones are found again."""
-        return pack_events(self._log.found[first : position.boundary.mark.events], self._precision)
+        return pack_events(self._log.found[first : position.events], self._precision)
 
-    def restore(self, chain: Chain) -> Position:
+    def restore(self, chain: Chain) -> Mark:
         """Put the last checkpoint back."""
         try:
             arrays = netcdf.read_group(chain.paths[-1], "checkpoint")
@@ -162,12 +162,12 @@ class Checkpoints:
                 if "previous_seal" in netcdf.root_attributes(path):
                     saved = netcdf.read_group(path, "events")
                     self._log.found += unpack_events(saved, self._precision, len(self._system.states))
-            if boundary.mark.events != len(self._log.found) or samples != chain.rows:
+            if boundary.events != len(self._log.found) or samples != chain.rows:
                 raise ValueError("its counts don't agree with what the segments hold")
         except (KeyError, ValueError) as error:
             raise RunFolderError(f"{chain.paths[-1]}: cannot be resumed from: {error}") from None
         between = int(arrays.get("rows_between", np.ones(1))[0])
-        return Position(boundary, self._rows.row(samples - 1) + between if samples else 0)
+        return replace(boundary, next_row=self._rows.row(samples - 1) + between if samples else 0)
 
 
 class Recorder(SampleReceiver):
@@ -183,7 +183,7 @@ class Recorder(SampleReceiver):
         statistics: SampleStatistics,
         trail: SampleTrail,
         checkpoints: Checkpoints,
-        start: Position | None,
+        start: Mark | None,
         sensitivity: "Sensitivity | None" = None,
     ) -> None:
         self.sensitivity = sensitivity
@@ -193,7 +193,7 @@ class Recorder(SampleReceiver):
         self._checkpoints = checkpoints
         self._dates = dates_of(prepared)
         self._published = published_of(prepared)
-        self._events_saved = 0 if start is None else start.boundary.mark.events
+        self._events_saved = 0 if start is None else start.events
         guard = prepared.scene.config.limits.max_drift
         self._max_drift = None if guard is None else float(guard)
         self.statistics = statistics
@@ -257,8 +257,8 @@ class Recorder(SampleReceiver):
         """Whether much is collected, or the last segment is old."""
         return self._writer.due
 
-    def save(self, position: Position) -> None:
+    def save(self, position: Mark) -> None:
         """Write a segment; on return all samples taken, and the state to continue from, are saved."""
         events = self._checkpoints.events(position, self._events_saved)
         self._writer.flush(self._checkpoints.packed(position), events)
-        self._events_saved = position.boundary.mark.events
+        self._events_saved = position.events

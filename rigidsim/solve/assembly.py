@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from rigidsim.solve.compiled import interruptible
-from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper, Position
+from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper
 from rigidsim.solve.driver import Driver
 from rigidsim.solve.effects.angle_wrapping import AngleWrapping
 from rigidsim.solve.effects.charts import Charts
@@ -18,7 +18,7 @@ from rigidsim.solve.projection import Projection, steps_between
 from rigidsim.solve.sampler import MEASURED, Check, Pacing, Progress, SampleReceiver
 from rigidsim.solve.solvers.algorithm import Algorithm
 from rigidsim.solve.solvers.taylor import Taylor
-from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.stepper import Mark, Stepper
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
 
@@ -98,11 +98,11 @@ def sampler(
     parts: Assembly,
     receiver: SampleReceiver,
     check: Check = lambda _: None,
-    start: Position | None = None,
+    start: Mark | None = None,
     pacing: Pacing = MEASURED,
     most_steps: int | None = None,
     progress: Progress | None = None,
 ) -> Driver:
     """What takes a prepared scene through its samples."""
-    solver, angles = prepared.algorithm.solver(parts.corrected, pacing), parts.evaluator.angles
-    return Driver(solver, prepared.clock, angles, receiver, check, start, pacing, most_steps, progress)
+    corrected, angles = parts.corrected, parts.evaluator.angles
+    return Driver(corrected, prepared.clock, angles, receiver, check, start, pacing, most_steps, progress)

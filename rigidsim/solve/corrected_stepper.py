@@ -7,7 +7,7 @@ first step boundary whose state asks for it.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -24,22 +24,6 @@ STRIDE = 1024
 """Natural steps between corrections if only time is corrected: half a millisecond, so that the calls cost
 less than a hundredth of it.
 """
-
-
-@dataclass(frozen=True)
-class StepBoundary:
-    """A natural step boundary of a run, with all that the integration needs to resume with the same bits."""
-
-    mark: Mark
-    memories: tuple[Any, ...]
-
-
-@dataclass(frozen=True)
-class Position:
-    """Position from which a run continues with the same bits."""
-
-    boundary: StepBoundary  # a step boundary past all rows before ``next_row``
-    next_row: int  # the first row (``sampling.Rows``) that isn't handed over
 
 
 _NEAR = 3  # number of steps up to which they are sooner taken one by one than together
@@ -76,16 +60,16 @@ class CorrectedStepper:
         """Whether steps have become too small to ever arrive, even at the next whole time."""
         return self._stuck or self.stepper.collapsed
 
-    def boundary(self) -> StepBoundary:
+    def boundary(self) -> Mark:
         """Remember this boundary."""
-        return StepBoundary(self.stepper.mark(), tuple([effect.memory for effect in self.effects]))
+        return replace(self.stepper.mark(), effects=tuple([effect.memory for effect in self.effects]))
 
-    def back_to(self, boundary: StepBoundary) -> None:
+    def back_to(self, boundary: Mark) -> None:
         """Return to a boundary."""
         self._stuck = False
-        for effect, memory in zip(self.effects, boundary.memories, strict=True):
+        for effect, memory in zip(self.effects, boundary.effects, strict=True):
             effect.back_to(memory, self.stepper)
-        self.stepper.back_to(boundary.mark)
+        self.stepper.back_to(boundary)
         self._set_limits()
 
     @property
@@ -93,29 +77,29 @@ class CorrectedStepper:
         """Versions of what a checkpoint holds of the stepper and of each effect, by their names."""
         return {"stepper": self.stepper.version, **{effect.name: effect.version for effect in self.effects}}
 
-    def pack(self, boundary: StepBoundary) -> Arrays:
+    def pack(self, mark: Mark) -> Arrays:
         """A boundary as arrays of a checkpoint."""
-        mark, precision = boundary.mark, self.stepper.precision
+        precision = self.stepper.precision
         arrays = pack(np.array(mark.time, dtype=precision.scalar), precision, "time")
         arrays |= pack(mark.state, precision, "state")
         arrays["counts"] = np.array([mark.steps, mark.events], dtype=np.int64)
         arrays |= self.stepper.pack(mark.memory)
-        for effect, memory in zip(self.effects, boundary.memories, strict=True):
+        for effect, memory in zip(self.effects, mark.effects, strict=True):
             arrays |= effect.pack(memory)
         return arrays
 
-    def unpack(self, arrays: Mapping[str, np.ndarray]) -> StepBoundary:
+    def unpack(self, arrays: Mapping[str, np.ndarray]) -> Mark:
         """A boundary restored from them; raises a KeyError or ValueError for another system or precision."""
         time, state = (unpack(arrays, self.stepper.precision, name) for name in ("time", "state"))
         steps, events, *_ = (int(n) for n in arrays["counts"])
         if time.shape != (2,) or state.shape != self.stepper.state.shape:
             raise ValueError("the checkpoint belongs to another system of equations")
-        mark = Mark((time[0], time[1]), state, events, steps, self.stepper.unpack(arrays))
-        return StepBoundary(mark, tuple(effect.unpack(arrays) for effect in self.effects))
+        memories = tuple(effect.unpack(arrays) for effect in self.effects)
+        return Mark((time[0], time[1]), state, events, steps, self.stepper.unpack(arrays), memories)
 
-    def arrive(self, boundary: StepBoundary, moment: Scalar) -> StepBoundary:
+    def arrive(self, boundary: Mark, moment: Scalar) -> Mark:
         """Go back, and on to the first boundary at or past a moment; returns the boundary before that."""
-        most = self.stepper.steps - boundary.mark.steps  # within which it lies, where they reach it
+        most = self.stepper.steps - boundary.steps  # within which it lies, where they reach it
         self.back_to(boundary)
         while most > _NEAR:
             here, part = self.boundary(), most // 2
@@ -139,7 +123,7 @@ class CorrectedStepper:
         stepper, smallest, largest = self.stepper, math.inf, 0.0
         while count > 0 and not self.collapsed:
             before, stride = stepper.steps, self.stride
-            if not stepper.skip(min(count, stride - before % stride)):
+            if not stepper.take(min(count, stride - before % stride)):
                 return False
             smallest, largest = min(smallest, stepper.smallest), max(largest, stepper.largest)
             stepper.smallest, stepper.largest = smallest, largest

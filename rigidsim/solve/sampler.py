@@ -1,18 +1,18 @@
 """What goes between a driver and its run: progress, checks, how much at once, and the buffer of samples."""
 
 import time
-from bisect import bisect_left, bisect_right
+from bisect import bisect_right
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
-from rigidsim.solve.corrected_stepper import Position, StepBoundary
 from rigidsim.solve.precision import Scalar
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampling import Rows
 from rigidsim.solve.status import Status
+from rigidsim.solve.stepper import Mark
 from rigidsim.solve.turns import JoinedAngles
 
 
@@ -29,7 +29,7 @@ class Progress:
     redone_steps: int = 0  # steps taken back because they went past a sample
     status: Status = Status.RUNNING
     integration_seconds: float = 0.0
-    last_good: StepBoundary | None = None  # last step boundary with a finite state, for a run that broke down
+    last_good: Mark | None = None  # last step boundary with a finite state, for a run that broke down
     detail: str = ""  # why it broke down, if more is known
 
     @property
@@ -60,7 +60,7 @@ class SampleReceiver(Protocol):
         """Whether it is time to save."""
         return False
 
-    def save(self, position: Position) -> None:
+    def save(self, position: Mark) -> None:
         """Save everything taken so far, and the position to resume from."""
         return None
 
@@ -94,11 +94,10 @@ class SampleBuffer:
     def __init__(
         self, rows: Rows, angles: JoinedAngles, receiver: SampleReceiver, pacing: Pacing, first: int = 0
     ) -> None:
-        self._clock, self._angles = rows, angles
-        self._receiver = receiver
-        self._pacing = pacing
+        self._rows, self._angles, self._receiver, self._pacing = rows, angles, receiver, pacing
         self.handed = self.count = first
-        self._pieces: list[tuple[SampleBlock, StepBoundary]] = []  # samples, and a step boundary before them
+        self._waiting: list[SampleBlock] = []
+        self._boundaries: list[tuple[int, Mark]] = []  # before the waiting rows from a number on
         self._most = _FEWEST_ROWS
         self._affordable: dict[str, int] = {}
         self._handed_at = time.perf_counter()
@@ -107,71 +106,56 @@ class SampleBuffer:
     @property
     def complete(self) -> bool:
         """Whether all samples have been found."""
-        return self.count >= self._clock.count
-
-    @property
-    def room(self) -> int:
-        """Number of samples that may still be found before the waiting ones are handed over."""
-        return self._most - (self.count - self.handed)
+        return self.count >= self._rows.count
 
     @property
     def full(self) -> bool:
         """Whether the waiting samples must be handed over before more are found."""
-        return self.room <= 0
+        return self.count - self.handed >= self._most
 
     @property
     def upcoming(self) -> Scalar:
         """Time of the next sample."""
-        first, times = self._times_around(self.count)
-        return times[self.count - first]
+        return self.ahead(None)[0]
 
-    def until(self, limit: Scalar, most: int) -> np.ndarray:
-        """Times of the next samples at or before ``limit``, at most ``most``."""
-        position = self.count
-        stop = min(self._clock.count, position + max(most, 0))
-        found = [self._times[1][:0]]
-        while position < stop:
-            first, times = self._times_around(position)
-            end = min(stop - first, len(times))
-            past = bisect_right(times, limit, position - first, end)
-            found.append(times[position - first : past])
-            position = first + past
-            if past < end:
-                break
-        return found[-1] if len(found) <= 2 else np.concatenate(found)
-
-    def _times_around(self, index: int) -> tuple[int, np.ndarray]:
-        """Times of a sample and those about it, as many as are evaluated together, and the first index."""
+    def ahead(self, far: float | None) -> np.ndarray:
+        """Times of the next samples (n,), n > 0, up to the first past a time, as many as may wait."""
         first, times = self._times
-        if not first <= index < first + len(times):
-            rows = self._pacing.rows_at_once
-            first = index - index % rows
-            self._times = first, self._clock.internal(first, min(first + rows, self._clock.count))
-        return self._times
+        if not first <= self.count < first + len(times):
+            first, rows = self.count, self._pacing.rows_at_once
+            times = self._rows.internal(first, min(first + rows, self._rows.count))
+            self._times = first, times
+        room = max(self._most - (self.count - self.handed), 1)
+        times = times[self.count - first : self.count - first + room]
+        return times if far is None else times[: bisect_right(times, far, key=float) + 1]
 
-    def take(self, block: SampleBlock, boundary: StepBoundary) -> None:
+    def take(self, block: SampleBlock, boundary: Mark) -> None:
         """Take the next samples, with a step boundary before them."""
-        if len(block):
-            self._pieces.append((block, boundary))
-            self.count += len(block)
+        self._waiting.append(block)
+        self._boundaries.append((self.count, boundary))
+        self.count += len(block)
 
     def back_to(self, count: int) -> None:
         """Forget all samples found since there were ``count``."""
-        while self._pieces and self._pieces[-1][0].first >= count:
-            self._pieces.pop()
+        while self._waiting and self._waiting[-1].first >= count:
+            self._waiting.pop()
+            self._boundaries.pop()
         self.count = max(count, self.handed)
 
-    @property
-    def boundary(self) -> StepBoundary | None:
-        """A step boundary before the first waiting sample; None if none waits."""
-        return self._pieces[0][1] if self._pieces else None
+    def position(self, boundary: Mark) -> Mark:
+        """Where to continue: before the first waiting sample; at a boundary if none waits."""
+        found = self._before(self.handed) if self._waiting else boundary
+        return replace(found, next_row=self.handed)
+
+    def _before(self, row: int) -> Mark:
+        return next(boundary for first, boundary in reversed(self._boundaries) if first <= row)
 
     @property
     def whole(self) -> bool:
         """Whether as many have been handed over as the receiver saves at the least cost."""
         return self.handed % self._receiver.rows_together == 0
 
-    def hand_over(self, *, patiently: bool = False) -> tuple[int, StepBoundary] | None:
+    def hand_over(self, *, patiently: bool = False) -> tuple[int, Mark] | None:
         """Hand what is collected to the receiver; ``patiently`` only if it is much or old, and if much, just
         the samples that make it ``whole``.
 
@@ -179,52 +163,43 @@ class SampleBuffer:
         the others dropped. A KeyboardInterrupt of the receiver is passed on: samples that it didn't take keep
         waiting.
         """
-        waiting, rows = self.count - self.handed, self._pacing.rows_at_once
-        waited = time.perf_counter() - self._handed_at
-        old = waited >= self._pacing.patience
+        begun, rows, started = self.handed, self._pacing.rows_at_once, time.perf_counter()
+        old, waiting = started - self._handed_at >= self._pacing.patience, self.count - begun
         if not waiting or (patiently and waiting < min(rows, self._most) and not old):
             return None
         stop = self.count - self.count % self._receiver.rows_together
-        if old or not patiently or stop <= self.handed:
+        if old or not patiently or stop <= begun:
             stop = self.count
-        started = self._handed_at = time.perf_counter()
-        whole, boundaries = self._waiting_until(stop)
-        handed = len(whole)
-        for start in range(0, handed, rows):
-            block, known = whole.rows(start, start + rows), self._angles.known
-            try:
-                self._receive(block)
-            except KeyboardInterrupt:  # while something that it needs was compiled: it took none of these
-                self._angles.known = known
-                self._pieces.insert(0, (whole.rows(start, handed), _before(block.first, boundaries)))
-                raise
-            self.handed += len(block)
-            wanted = self._receiver.last_wanted
-            if wanted is not None:
-                last, self._pieces, self._angles.known = self._clock.row(wanted), [], known
-                self._angles.joined(block.rows(0, last + 1 - block.first))
-                self.count = self.handed = last + 1
-                return wanted, _before(last, boundaries)
-        self.took("hand over", handed, time.perf_counter() - started)
+        self._handed_at, whole = started, SampleBlock.concatenated(self._waiting)
+        try:
+            while self.handed < stop:
+                at = self.handed - begun
+                block, known = whole.rows(at, min(at + rows, stop - begun)), self._angles.known
+                try:
+                    self._receive(block)
+                except KeyboardInterrupt:  # while something that it needs was compiled: it took none of these
+                    self._angles.known = known
+                    raise
+                self.handed += len(block)
+                if (wanted := self._receiver.last_wanted) is not None:
+                    last, self._angles.known = self._rows.row(wanted), known
+                    self._angles.joined(block.rows(0, last + 1 - block.first))
+                    self.count = self.handed = last + 1
+                    return wanted, self._before(last)
+        finally:
+            self._waiting = [whole.rows(self.handed - begun, self.count - begun)]
+            self._boundaries = [(self.handed, self._before(self.handed))]
+            if self.handed == self.count:
+                self._waiting, self._boundaries = [], []
+        self.took("hand over", stop - begun, time.perf_counter() - started)
         return None
 
     def _receive(self, block: SampleBlock) -> None:
         """Hand over the samples among some rows, with their angles."""
-        which = self._clock.are_samples(block.first, block.first + len(block))
+        which = self._rows.are_samples(block.first, block.first + len(block))
         block = self._angles.joined(block)
         if which.any():
-            self._receiver.take(block.only(which, self._clock.samples(block.first)))
-
-    def _waiting_until(self, stop: int) -> tuple[SampleBlock, dict[int, StepBoundary]]:
-        """Take out the waiting samples before ``stop``, and boundaries before each piece, by its first."""
-        cut = bisect_left(self._pieces, stop, key=lambda piece: piece[0].first)
-        pieces, self._pieces = self._pieces[:cut], self._pieces[cut:]
-        block, boundary = pieces[-1]
-        if (inside := stop - block.first) < len(block):
-            self._pieces.insert(0, (block.rows(inside, len(block)), boundary))
-            pieces[-1] = block.rows(0, inside), boundary
-        boundaries = {block.first: boundary for block, boundary in pieces}
-        return SampleBlock.concatenated([block for block, _ in pieces]), boundaries
+            self._receiver.take(block.only(which, self._rows.samples(block.first)))
 
     def took(self, work: str, rows: int, seconds: float) -> None:
         """Adapt how many samples may wait to what each kind of work gets done in the time of a chunk."""
@@ -234,8 +209,3 @@ class SampleBuffer:
         self._affordable[work] = int(rows * pacing.chunk_seconds / max(seconds, 1e-9))
         affordable = max(min(self._affordable.values()), _FEWEST_ROWS)
         self._most = min(affordable, _GROWTH * self._most, pacing.rows_waiting)
-
-
-def _before(sample: int, boundaries: dict[int, StepBoundary]) -> StepBoundary:
-    """The boundary before the piece in which a sample was found."""
-    return boundaries[max(first for first in boundaries if first <= sample)]

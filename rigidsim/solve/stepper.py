@@ -5,7 +5,7 @@ which the engine, which uses the last two terms of a series, can't tell.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -19,13 +19,15 @@ from rigidsim.solve.precision import Precision, Scalar
 
 @dataclass(frozen=True)
 class Mark:
-    """A natural step boundary."""
+    """A natural step boundary, with all that a run needs to go on from it with the same bits."""
 
     time: tuple[Scalar, Scalar]  # two numbers whose sum it is, internal units
     state: np.ndarray  # (states,), internal units
     events: int = 0
     steps: int = 0
     memory: Any = None  # whatever else the stepper's later steps depend on, as a value that stays as it is
+    effects: tuple[Any, ...] = ()  # the memory of each effect
+    next_row: int = 0  # the first row (``sampling.Rows``) that isn't handed over
 
 
 class Watcher(Protocol):
@@ -39,26 +41,31 @@ class Watcher(Protocol):
 
 
 class SamplesWithin:
-    """Samples within steps as they are taken, at all sample times (n,), ascending, up to a limit, past which
-    it asks to end the call.
+    """Samples within steps as they are taken, at ascending times (n,), n > 0; past the last one it asks to
+    end the call.
     """
 
-    def __init__(self, times: np.ndarray, limit: Scalar) -> None:
-        self.times, self.limit = times, limit
+    def __init__(self, times: np.ndarray) -> None:
+        self.times = times
         self.states: Any = []  # or an array (n, states)
         self.ended = False
 
     def __call__(self, engine: TaylorEngine) -> bool:
-        """Take those within the step just taken, from its dense output; False if it asks to end the call."""
-        now, count = engine.time, len(self.states)
+        """Take those within the engine's step; False if it asks to end the call."""
+        return self.passed(engine.time, engine.update_d_output)
+
+    def passed(self, now: Scalar, dense: Callable[[Scalar], np.ndarray]) -> bool:
+        """Take those within a step that ends now; False if it asks to end the call."""
+        count = len(self.states)
         while count < len(self.times) and self.times[count] <= now:
-            self.states.append(np.array(engine.update_d_output(self.times[count])))  # a buffer is reused
+            self.states.append(np.array(dense(self.times[count])))  # heyoka reuses its buffer
             count += 1
-        return self.within(engine)
+        self.ended = now >= self.times[-1]
+        return not self.ended
 
     def within(self, engine: TaylorEngine) -> bool:
-        """False if it asks to end the call."""
-        self.ended = engine.time >= self.limit
+        """False if it asks to end the call, where the engine itself takes them."""
+        self.ended = engine.time >= self.times[-1]
         return not self.ended
 
     def until(self, stop: Scalar | None) -> np.ndarray:
@@ -149,18 +156,17 @@ class Stepper:
         """State at a time within the step just taken by ``step``, shape (states,)."""
         raise NotImplementedError
 
-    def dense_rows(self, times: np.ndarray) -> np.ndarray:
-        """The same at many times (n,), (n, states)."""
-        return np.array([self.dense(time) for time in times])
-
-    def skip(self, count: int) -> bool:
-        """Take ``count`` steps, fewer if one ends at ``until``; False if the state is no longer finite."""
+    def take(self, count: int, samples: SamplesWithin | None = None) -> bool:
+        """Take at most ``count`` steps, and samples within them; fewer if all samples are taken, the watcher
+        ends the call, or one ends at ``until``. False if the state is no longer finite.
+        """
         smallest, largest = math.inf, 0.0
         for _ in range(count):
             if not self.step():
                 return False
             smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
-            if self.ended or self.collapsed or self.time == self.until:
+            going = samples is None or samples.passed(self.time, self.dense)
+            if not going or self.ended or self.collapsed or self.time == self.until:
                 break
         self.smallest, self.largest = smallest, largest
         return True

@@ -12,7 +12,7 @@ from rigidsim.model.system import System
 from rigidsim.solve.compiled import TaylorEngine, compiled_engine, interruptible
 from rigidsim.solve.events import EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
-from rigidsim.solve.requirements import after_each_step, requirement_of
+from rigidsim.solve.requirements import requirement_of
 from rigidsim.solve.stepper import Mark, SamplesWithin, Stepper, bound_of_sparse_series, longest_step
 
 _ARRIVED = hy.taylor_outcome.time_limit
@@ -24,6 +24,9 @@ _HOPELESS_STEPS = 1e15  # left to the last sample; at the fastest pace they woul
 _LEAST_GRID = 8  # steps from which a grid, of 20 us, costs less than a callback
 _TINY_STEPS = 32  # in a row, before a run is given up: a close passage has some
 _LONGEST_FOLLOWED = 1.0  # a turn by 1 rad or less: in the partner chart angles are followed step by step
+
+StepCallback = Callable[[TaylorEngine], bool]
+"""Called after each of many steps; False ends the call."""
 
 
 class TaylorStepper(Stepper):
@@ -110,24 +113,22 @@ class TaylorStepper(Stepper):
 
     def _meet(self) -> Scalar | None:
         """Set what the equations need here; returns the time beyond which no step may go, None for any."""
-        if self._requirement is None:
-            return self.until
         return _earlier(self._requirement.meet(self._integrator), self.until)
 
     @property
     def end(self) -> Scalar | None:
         """The time beyond which no step that begins now may go; None for any."""
-        if self._requirement is None:
-            return self.until
         return _earlier(self._requirement.end_after(self.time), self.until)
 
     def _watched(
-        self, samples: Callable[[TaylorEngine], bool] | None = None
-    ) -> Callable[[TaylorEngine], bool] | None:
+        self, *samples: Callable[[TaylorEngine], bool]
+    ) -> list[Callable[[TaylorEngine], bool]] | None:
         """What to call after each of the steps that begin now."""
+        watching: list[StepCallback] = []
         if self.watcher is not None:
             self.watcher.begin(self._integrator.time)
-        return after_each_step(self._requirement, self.watcher, samples)
+            watching.append(self.watcher)
+        return [*self._requirement.each, *watching, *samples] or None
 
     @property
     def integrator(self) -> TaylorEngine:
@@ -171,42 +172,26 @@ class TaylorStepper(Stepper):
             return True
         self._meet()
         # one step is nearly always enough, and costs less than a call that may take several
-        if engine.step(-time[1])[0] == _ARRIVED and engine.dtime == (time[0], 0):
-            return True
-        engine.dtime = time
-        engine.state[:] = state
-        if engine.propagate_until(time[0], max_steps=_MOST_TO_WHOLE_TIME)[0] == _ARRIVED:
-            return True
-        engine.dtime = time
-        engine.state[:] = state
+        for arrived in (
+            lambda: engine.step(-time[1])[0] == _ARRIVED and engine.dtime == (time[0], 0),
+            lambda: engine.propagate_until(time[0], max_steps=_MOST_TO_WHOLE_TIME)[0] == _ARRIVED,
+        ):
+            if arrived():
+                return True
+            engine.dtime = time
+            engine.state[:] = state
         return False
 
     def step(self) -> bool:
         """Take one step with dense output; False if the state is no longer finite."""
-        until = self._meet()
-        if until is not None:
-            return self._propagate(until, 1, dense=True)
-        self._watched()
-        before = self._integrator.time
-        outcome, size = self._integrator.step(self._longest, write_tc=True)
-        if outcome == _LOST:
-            self.smallest, self.largest = np.inf, 0.0  # as where no step was taken: its size may be no number
-            return False
-        self.smallest = self.largest = abs(float(size))
-        self.steps += 1
-        self._judge(before, 1)
-        if self.watcher is not None:
-            self.watcher(self._integrator)
-        return True
+        return self._propagate(self._meet(), 1, dense=True)
 
     def dense(self, time: Scalar) -> np.ndarray:
         return np.array(self._integrator.update_d_output(time))  # heyoka reuses its buffer
 
     def take(self, count: int, samples: SamplesWithin | None = None) -> bool:
-        """Take at most ``count`` steps, fewer if the watcher or all samples asked for end the call, and the
-        samples within them; False if the state is lost.
-        """
-        last, smallest, largest, end = self.steps + count, math.inf, 0.0, None
+        """See ``Stepper``."""
+        last, smallest, largest = self.steps + count, math.inf, 0.0
         while True:
             end = self._meet()
             if not self._within_piece(last - self.steps, end, samples):
@@ -225,11 +210,11 @@ class TaylorStepper(Stepper):
         where that takes no other steps, as it would from a time that is two numbers.
         """
         engine, before = self._integrator, self._integrator.dtime
-        each = self._requirement is not None and self._requirement.each
-        if samples is None or end is not None or each or count < _LEAST_GRID or before[1] != 0:
+        plain = end is None and not self._requirement.each and before[1] == 0
+        if samples is None or not plain or count < _LEAST_GRID:
             return self._propagate(end, count, samples)
         times = samples.times
-        first = int(len(times) > 0 and times[0] == before[0])
+        first = int(times[0] == before[0])
         outcome, smallest, largest, taken, _, states = engine.propagate_grid(
             np.concatenate([[before[0]], times[first:], [self._far]]).astype(times.dtype),
             max_steps=count,
@@ -238,9 +223,6 @@ class TaylorStepper(Stepper):
         )
         samples.states = states[1 - first :]
         return self._account(before, outcome, smallest, largest, taken)
-
-    def skip(self, count: int) -> bool:
-        return self._propagate(self._meet(), count)
 
     def to(self, time: float) -> bool:
         """Go exactly to a time with a shortened last step: for comparisons, never for a run's samples."""
@@ -252,7 +234,7 @@ class TaylorStepper(Stepper):
                 time if last else until,
                 max_steps=_CHUNK_TO,
                 max_delta_t=self._longest,
-                callback=after_each_step(self._requirement),
+                callback=list(self._requirement.each) or None,
             )
             if outcome == _ARRIVED and last:
                 return True
@@ -270,7 +252,7 @@ class TaylorStepper(Stepper):
             self._far if until is None else until,
             max_steps=count,
             max_delta_t=self._longest,
-            callback=self._watched(samples),
+            callback=self._watched(*([] if samples is None else [samples])),
             write_tc=dense or samples is not None or self.watcher is not None,
         )
         return self._account(before, outcome, smallest, largest, taken)

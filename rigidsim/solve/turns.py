@@ -320,7 +320,7 @@ class JoinedAngles:
         """
         if self._system.turning or not times[-1] > times[0]:
             return None
-        stepper, samples = self._stepper, SamplesWithin(times, times[-1])
+        stepper, samples = self._stepper, SamplesWithin(times)
         stepper.use(chart)
         stepper.back_to(replace(stepper.begun, time=(float(times[0]), 0.0), state=state))
         stepper.settle()

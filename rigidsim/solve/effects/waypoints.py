@@ -39,7 +39,7 @@ class Waypoints(Effect):
     def apply(self, stepper: Stepper, stride: int) -> bool:
         kept, spacing = self.memory
         number, state = stepper.steps // stride, stepper.state
-        if number % spacing:
+        if number % spacing or not stepper.steps:  # a closed form takes none
             return True
         # numbers of more than 80 bits aren't numpy's own
         plain = state.astype(np.float64) if state.dtype.kind == "f" else np.array([float(x) for x in state])

@@ -14,7 +14,6 @@ from rigidsim.solve.closed_form import ClosedForm
 from rigidsim.solve.effects.effect import registered_effects
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar, precision_of
-from rigidsim.solve.solvers.stepwise import StepwiseSolver
 from rigidsim.solve.stepper import Stepper
 
 
@@ -35,7 +34,6 @@ class Algorithm:
         own_errors: whether it tells its errors itself (``Stepper.errors``), or has none to tell; if not, they
             are estimated from motions that begin beside its own, in heyoka's rounding.
         form: the closed form that gives the states; None if none does.
-        solver: takes the motion along by its stepper.
     """
 
     method: ClassVar[Method]
@@ -44,7 +42,6 @@ class Algorithm:
     takes_series: ClassVar[bool] = False
     own_errors: ClassVar[bool] = True
     form: ClosedForm | None = None
-    solver: ClassVar[type[StepwiseSolver]] = StepwiseSolver
 
     @property
     def title(self) -> str:

@@ -14,13 +14,13 @@ from rigidsim.solve.closed_form import ClosedForm, NoClosedForm, closed_form_of
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.solvers.algorithm import Algorithm, Unsuitable, solves
-from rigidsim.solve.stepper import Mark, Stepper
-
-_PART = 2.0**-6  # of the motion, after which progress is noted
+from rigidsim.solve.stepper import Mark, SamplesWithin, Stepper
 
 
 class ClosedFormStepper(Stepper):
-    """Goes along a motion whose states are known at all times, by a part of it; such steps aren't counted."""
+    """Takes samples of a motion whose states are known at all times; it counts no steps, and goes on from
+    its start alone.
+    """
 
     def __init__(self, form: ClosedForm, system: System, precision: Precision, start: Scalar) -> None:
         super().__init__(system, precision)
@@ -37,15 +37,22 @@ class ClosedFormStepper(Stepper):
         return self._state
 
     def step(self) -> bool:
-        length = ((self.destination or 0.0) - float(self._start)) * _PART
+        length = (self.destination or 0.0) - float(self._start)
         self._time = self._time + self.precision.of_double(length or 1.0)
         return True
 
-    def dense_rows(self, times: np.ndarray) -> np.ndarray:
-        return self._form.states(self.system, self.precision, times, self._start)
+    def take(self, count: int, samples: SamplesWithin | None = None) -> bool:
+        if samples is None:
+            return self.step()
+        samples.states = self._form.states(self.system, self.precision, samples.times, self._start)
+        self._time = samples.times[-1]
+        return True
+
+    def mark(self) -> Mark:
+        return Mark((self._start, self.precision.of_double(0.0)), self._state)
 
     def back_to(self, mark: Mark) -> None:
-        self._time = mark.time[0]
+        self._time = self._start
 
 
 @solves(METHODS["closed_form"])

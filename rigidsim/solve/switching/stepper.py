@@ -519,9 +519,6 @@ class SwitchingStepper(TaylorStepper):
         """Take one step, not past a surface; False if lost, or if it can't go on (``failure`` says why)."""
         return self._one()
 
-    def skip(self, count: int) -> bool:
-        return self.take(count)
-
     def to(self, time: float) -> bool:
         known = self.until
         try:
