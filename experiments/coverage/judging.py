@@ -16,7 +16,7 @@ from rigidsim.scene.cautions import WarningCode
 from rigidsim.scene.config import Experiment
 from rigidsim.session.diagnostics import Diagnostics
 from rigidsim.session.recorder import SampleStatistics
-from rigidsim.solve.assembly import Assembly, assemble, sampler
+from rigidsim.solve.assembly import Assembly, assemble
 from rigidsim.solve.effects.waypoints import SampleTrail
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
@@ -192,7 +192,7 @@ def gone_through(prepared: InitialValueProblem, most: int = MOST_STEPS) -> tuple
     parts = assemble(prepared)
     seen = Kept(prepared, parts.evaluator)
     check: Callable[[Progress], Status | None] = lambda p: Status.MAX_STEPS if p.steps > most else None  # noqa: E731
-    return seen, sampler(prepared, parts, seen, check).run(), parts
+    return seen, parts.driver(seen, check).run(), parts
 
 
 def _truth(

@@ -12,7 +12,7 @@ import rigidsim
 from experiments.peers import Answer
 from experiments.peers.scenes import Scene
 from rigidsim.session.session import Observer
-from rigidsim.solve.assembly import assemble, sampler
+from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.problem import prepare as prepared_from
 from rigidsim.solve.sample_block import SampleBlock
@@ -130,7 +130,7 @@ def _propagated(problem: InitialValueProblem) -> Answer:
     """
     parts, kept = assemble(problem), _Kept()
     started = time.process_time()
-    progress = sampler(problem, parts, kept).run()
+    progress = parts.driver(kept).run()
     for block in kept.blocks:
         recorded = parts.evaluator.evaluate(block)
     quaternion = recorded["quaternion"][0][-1].tolist()

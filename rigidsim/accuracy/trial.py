@@ -16,7 +16,7 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import fraction_of
 from rigidsim.scene.sample_times import SampleTimes
 from rigidsim.scene.scene import Scene, build_scene
-from rigidsim.solve.assembly import Assembly, assemble, sampler
+from rigidsim.solve.assembly import Assembly, assemble
 from rigidsim.solve.problem import InitialValueProblem, prepare_scene
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import Check, Progress, SampleReceiver
@@ -41,7 +41,7 @@ class Collected(SampleReceiver):
     ) -> None:
         self.parts: Assembly = assemble(prepared)
         self._pieces: dict[str, list[Sequence[np.ndarray]]] = {name: [] for name in names}
-        self.progress = sampler(prepared, self.parts, self, check).run()
+        self.progress = self.parts.driver(self, check).run()
 
     def take(self, block: SampleBlock) -> None:
         """See ``SampleReceiver``."""

@@ -15,7 +15,7 @@ from rigidsim.session.ending import chart_changes, closing_words, time_reached
 from rigidsim.session.recorder import Checkpoints, Recorder, SampleStatistics
 from rigidsim.session.session import Guards, Interruption, Observer, RunCost, Session
 from rigidsim.session.summary import cost_so_far, summarise
-from rigidsim.solve.assembly import assemble, sampler
+from rigidsim.solve.assembly import assemble
 from rigidsim.solve.effects.waypoints import SampleTrail
 from rigidsim.solve.lyapunov import LyapunovSpectrum
 from rigidsim.solve.problem import InitialValueProblem
@@ -100,7 +100,7 @@ class _ActiveRun:
         if most is not None and start is not None:
             most += start.steps
         pacing = session.tuning.pacing
-        self.driver = sampler(prepared, parts, self.recorder, guards, start, pacing, most, progress)
+        self.driver = parts.driver(self.recorder, guards, start, pacing, most, progress)
         if start is not None:
             session.observer.resumed(progress)
 

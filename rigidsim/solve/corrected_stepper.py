@@ -30,10 +30,10 @@ _NEAR = 3  # number of steps up to which they are sooner taken one by one than t
 
 
 class CorrectedStepper:
-    """Takes steps and applies effects when they are due, at most ``stride`` natural steps apart."""
+    """Takes steps and applies effects when they are due, at most ``STRIDE`` natural steps apart."""
 
-    def __init__(self, stepper: Stepper, effects: Sequence[Effect], *, stride: int = STRIDE) -> None:
-        self.stepper, self.effects, self._longest_stride = stepper, tuple(effects), stride
+    def __init__(self, stepper: Stepper, effects: Sequence[Effect]) -> None:
+        self.stepper, self.effects = stepper, tuple(effects)
         self._anywhere = [effect for effect in effects if effect.anywhere]
         self._stuck = False
         self._set_limits()
@@ -43,7 +43,7 @@ class CorrectedStepper:
         return next((effect for effect in self.effects if isinstance(effect, kind)), None)
 
     def _set_limits(self) -> None:
-        self.stride = min([self._longest_stride, *(effect.limit for effect in self.effects)])
+        self.stride = min([STRIDE, *(effect.limit for effect in self.effects)])
         self._set_until()
 
     def _set_until(self) -> None:

@@ -87,15 +87,13 @@ class Evaluator:
         self._system = system
         self._precision = precision
         self._wrapping = wrapping
-        self._outputs = self._compile(system.outputs) if system.outputs else None
         components = [x for invariant in system.invariants for x in invariant.expressions]
-        self._invariants = self._compile(components or system.variables[:1])  # of a motion that keeps nothing
-        initial = precision.array(system.initial)
-        start = precision.array([system.start])
-        begun = evaluate_rows(self._invariants, initial[None, :], times=start) if components else None
-        self.initial = initial[:0] if begun is None else begun[:, 0]
         self._parameters = len(components)
-        self.code = self._invariants
+        self.code = self._compile([*system.outputs, *components] or system.variables[:1])
+        initial, start = precision.array(system.initial), precision.array([system.start])
+        none = precision.of_doubles(np.zeros(len(components))) if components else None
+        begun = evaluate_rows(self.code, initial[None, :], none, start)
+        self.initial = begun[len(system.outputs) :, 0] if components else initial[:0]
         self.angles = JoinedAngles(system, self._compile, precision, has_steps=has_steps)
         self.last_quaternion: np.ndarray | None = None
         self._recorded = [
@@ -132,9 +130,8 @@ class Evaluator:
         """All variables of a block with its joined angles, which must follow the one before, and each
         invariant's drift, (n, 1).
         """
-        assert self._outputs is not None
         initial = self.initial if self._parameters else None
-        values = evaluate_rows(self._outputs, block.states, initial, block.times)
+        values = evaluate_rows(self.code, block.states, initial, block.times)[: len(self._system.outputs)]
         in_partner = block.chart != 0
         angles: np.ndarray | None = None
         if self._system.partner is not None and in_partner.any():

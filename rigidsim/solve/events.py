@@ -14,7 +14,7 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.errors import StoppedError
-from rigidsim.model.system import System
+from rigidsim.model.system import Crossing, System
 from rigidsim.solve.checkpoint import Arrays, pack, unpack
 from rigidsim.solve.compiled import TaylorEngine, compiled_function
 from rigidsim.solve.precision import Precision, Scalar
@@ -47,9 +47,7 @@ class FoundEvent:
 class EventLog:
     """All crossings so far, in order of time."""
 
-    stops: list[bool] = field(default_factory=list)
-    impossible: list[str] = field(default_factory=list)  # why none can go on past each; empty if it can
-    leaving: list[bool] = field(default_factory=list)  # whether that is the end of a model's range
+    crossings: Sequence[Crossing] = ()
     angles: Callable[[], AngleState] = AngleState
     found: list[FoundEvent] = field(default_factory=list)
     stop: Scalar | None = None  # time of the first crossing that ends the run, or None
@@ -68,28 +66,27 @@ class EventLog:
         if self.stop is not None and time > self.stop:
             return
         self.found.append(FoundEvent(index, time, np.array(state), self.angles()))
-        if self.stops[index] and self.stop is None:
+        if self.crossings[index].stop and self.stop is None:
             self.stop = time
 
     @property
     def ending(self) -> FoundEvent | None:
         """The crossing that ends the run."""
-        return next((f for f in self.found if self.stops[f.index]), None)
+        return next((f for f in self.found if self.crossings[f.index].stop), None)
 
     @property
     def why_impossible(self) -> str:
         """Why the motion can't go on past the crossing that ends the run; empty if that is an event."""
         ending = self.ending
-        return "" if ending is None or not self.impossible else self.impossible[ending.index]
+        return "" if ending is None else self.crossings[ending.index].impossible
 
     @property
     def status(self) -> Status:
         """The status of a run that the first crossing that stops it has ended."""
-        if not self.why_impossible:
-            return Status.EVENT
         ending = self.ending
-        leaves = ending is not None and bool(self.leaving) and self.leaving[ending.index]
-        return Status.OUT_OF_RANGE if leaves else Status.IMPOSSIBLE
+        if ending is None or not self.why_impossible:
+            return Status.EVENT
+        return Status.OUT_OF_RANGE if self.crossings[ending.index].leaves_range else Status.IMPOSSIBLE
 
     def occurrences(self, index: int, last: float) -> list[FoundEvent]:
         """The crossings of one event up to a time, internal units."""
@@ -100,9 +97,6 @@ class EventLog:
         if count > len(self.found):
             raise ValueError(f"{len(self.found)} events are known, not {count}")
         del self.found[count:]
-        self._find_stop()
-
-    def _find_stop(self) -> None:
         ending = self.ending
         self.stop = None if ending is None else ending.time
 

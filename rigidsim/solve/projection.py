@@ -21,7 +21,7 @@ exactly where it began is left alone: what is zero for good stays zero.
 """
 
 from collections.abc import Sequence
-from functools import reduce
+from functools import cached_property, reduce
 from typing import Any
 
 import heyoka as hy
@@ -126,24 +126,27 @@ class Projection:
         self._residuals_memory, self._times = self.memory[: 3 * m], self.memory[3 * m : 3 * m + 3 + late]
         self._times[0] = self._start
         self._functions: dict[int, tuple[CompiledFunction, CompiledFunction]] = {}
-        self._loaded = -1  # the chart whose functions are in use
-        if not late:
-            self._then[:] = self.residuals(precision.array(system.initial))
-
-    def _prepare(self) -> None:
-        """Compile the initial invariants and set up the rest once; a correction is a call of 7 us."""
-        self._wide = wide = self._system.rounded(self._high.number)
-        projected, _ = projected_invariants(wide)
-        values = compiled_function([h.expression for h in projected], wide.variables, **self._options)
-        self._reference = values(self._high.array(wide.initial))
-        n, m = len(wide.states), len(projected)
-        # views into the compiled functions' input and output
+        # views into the compiled functions' input and output; a correction is a call of 7 us
         self._in = self._high.of_doubles(np.zeros(n + 2 + 3 * m))
         self._out = self._high.of_doubles(np.zeros(n + 2 * m + 1))
         self._state, self._clock, self._remembered = self._in[:n], self._in[n : n + 2], self._in[n + 2 :]
         self._left = self._high.of_doubles(np.zeros(m))
         self._result = np.zeros(n + 2 * m + 1)
         self._change, self._new_sums = self._result[:n], self._result[n:-1]
+        if not late:
+            self._then[:] = self.residuals(precision.array(system.initial))
+
+    @cached_property
+    def _wide(self) -> System:
+        return self._system.rounded(self._high.number)
+
+    @cached_property
+    def _reference(self) -> np.ndarray:
+        """Initial values of the projected scalars."""
+        wide = self._wide
+        projected, _ = projected_invariants(wide)
+        values = compiled_function([h.expression for h in projected], wide.variables, **self._options)
+        return np.asarray(values(self._high.array(wide.initial)))
 
     @property
     def holding(self) -> bool:
@@ -180,19 +183,13 @@ class Projection:
 
     def load(self) -> None:
         """Compile the correction for the states in use, unless that is done."""
-        if self._loaded == self._chart:
-            return
-        if not self._functions:
-            self._prepare()
         if self._chart not in self._functions:
             self._functions[self._chart] = self._compile()
-        self._residuals, self._correction = self._functions[self._chart]
-        self._timed = bool(self._correction.is_time_dependent)  # by what the equations lack
-        self._loaded = self._chart
 
     def project(self, state: np.ndarray, time: Scalar) -> None:
         """Correct a state in place, at a natural step boundary; a function of it, the time and ``memory``."""
         self.load()
+        residuals, correction = self._functions[self._chart]
         now, times = float(time), self._times
         elapsed = now - times[0]
         # the longest so far: an aim worked out for a shorter one than the next would overshoot
@@ -207,8 +204,9 @@ class Projection:
             self._state[:] = self._widened(state)
             self._clock[:] = self._high.of_doubles(np.array([elapsed, pace]))
             self._remembered[:] = self._high.of_doubles(self._residuals_memory)
-        at = {"time": self._high.of_doubles(np.array([now]))[0]} if self._timed else {}
-        self._correction(self._in, outputs=self._out, **at)
+        timed = correction.is_time_dependent  # by what the equations lack
+        at = {"time": self._high.of_doubles(np.array([now]))[0]} if timed else {}
+        correction(self._in, outputs=self._out, **at)
         self._result[:] = self._out
         if not self._result[-1] < _LARGEST**2:  # also where it is nan
             times[2] += 1
@@ -217,14 +215,15 @@ class Projection:
         state -= self._change if cheap else self._low.of_doubles(self._change)
         self._sums[:] = self._new_sums
         self._state[:] = state if cheap else self._widened(state)
-        self._residuals(self._state, outputs=self._left)
+        residuals(self._state, outputs=self._left)
         self._then[:] = self._left
         times[0], times[1] = now, interval
 
     def residuals(self, state: np.ndarray) -> np.ndarray:
         """(value - initial) / scale of each projected scalar, float64, evaluated one precision higher."""
         self.load()
-        return np.asarray(self._residuals(self._widened(state))).astype(np.float64)
+        residuals, _ = self._functions[self._chart]
+        return np.asarray(residuals(self._widened(state))).astype(np.float64)
 
     @property
     def corrections(self) -> np.ndarray:

@@ -16,7 +16,7 @@ import rigidsim
 from rigidsim import ConfigError
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import try_setting
-from rigidsim.solve.assembly import assemble, sampler
+from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
@@ -53,7 +53,7 @@ def about_z(
     )
     prepared = prepare(rigidsim.parse(text))
     kept = Kept()
-    progress = sampler(prepared, assemble(prepared), kept).run()
+    progress = assemble(prepared).driver(kept).run()
     system = prepared.system
     found = {
         name: mpmath.ldexp(prepared.precision.exact(kept.states[-1][i]), system.state_exponents[i])
@@ -110,7 +110,7 @@ def test_friction_about_three_axes_ends_in_rest() -> None:
     )
     prepared = prepare(rigidsim.parse(text))
     kept = Kept()
-    progress = sampler(prepared, assemble(prepared), kept).run()
+    progress = assemble(prepared).driver(kept).run()
     assert progress.status is Status.FINISHED
     states = dict(zip(prepared.system.states, kept.states[-1], strict=True))
     energy = np.ldexp((0.25 + 1.3 * 0.49 + 2) / 2, -prepared.system.scaling.energy)

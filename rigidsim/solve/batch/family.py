@@ -78,28 +78,21 @@ def batchable(experiment: Experiment, keys: Sequence[str]) -> NotBatchable | Non
 
 def _reason_of_system(traced: TracedSystem) -> NotBatchable | None:
     system = traced.system
-    if registered_effects(system, precision_of("double")):
-        return NotBatchable.EFFECT
-    if system.switches:
-        return NotBatchable.SWITCHING
-    if len(system.crossings) > len(system.events):
-        return NotBatchable.MOVED_MASS
-    if system.pieces is not None:
-        return NotBatchable.TABLE
-    if system.clocked:
-        return NotBatchable.MOMENT
-    if traced.prepared.system.in_two_parts:
-        return NotBatchable.NUTATION
-    if system.scene.bodies is not None:
-        return NotBatchable.BODIES
     # angles in so large a unit are never wrapped here: what follows from them is joined
     unwrapped = bool(system.angle_states and system.angle_unit)
-    if system.partner is not None or (system.angle_states and not unwrapped):
-        return NotBatchable.CHART
-    joined = {r.continuity for r in system.recorded} - (
-        {"", "wrapped", "parity"} if unwrapped else {"", "nearest"}
-    )
-    return NotBatchable.ANGLES if joined else None
+    known = {"", "wrapped", "parity"} if unwrapped else {"", "nearest"}
+    reasons = {
+        NotBatchable.EFFECT: bool(registered_effects(system, precision_of("double"))),
+        NotBatchable.SWITCHING: system.switches,
+        NotBatchable.MOVED_MASS: len(system.crossings) > len(system.events),
+        NotBatchable.TABLE: system.pieces is not None,
+        NotBatchable.MOMENT: system.clocked,
+        NotBatchable.NUTATION: traced.prepared.system.in_two_parts,
+        NotBatchable.BODIES: system.scene.bodies is not None,
+        NotBatchable.CHART: system.partner is not None or (system.angle_states and not unwrapped),
+        NotBatchable.ANGLES: not {r.continuity for r in system.recorded} <= known,
+    }
+    return next((reason for reason, holds in reasons.items() if holds), None)
 
 
 class AxisNumbers:

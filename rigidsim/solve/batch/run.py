@@ -1,4 +1,10 @@
-"""Members of a family from their start to their last sample, with everything that is recorded of them."""
+"""Members of a family from their start to their last sample, with everything that is recorded of them.
+
+As in a single run an event's expression is given a unit in which it is of order one, and is taken off a zero
+that the motion begins at (``rigidsim.solve.events``). Both depend on the member, so that they are parameters.
+Tangent vectors have an integrator and functions apart: compiled with them, the motion might be rounded
+otherwise.
+"""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -11,16 +17,16 @@ import numpy as np
 
 from rigidsim.model.tangents import GROWTH
 from rigidsim.solve.batch.family import Family, Numbers
-from rigidsim.solve.batch.motion import BatchMotion
-from rigidsim.solve.batch.tracing import TracedSystem
 from rigidsim.solve.compiled import compiled_function, evaluate_rows
-from rigidsim.solve.lanes import LaneResults, recommended_width
+from rigidsim.solve.events import BESIDE, STATES, TIMES, exponents_of
+from rigidsim.solve.lanes import BatchEngine, BatchSystem, LaneResults, recommended_width
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
 
 Values = dict[str, np.ndarray]
 
+_DOUBLE = precision_of("double")
 _VALUES_AT_ONCE = 2_000_000
 """Sample values evaluated together; more would take memory that has to be fetched anew for each operation."""
 _MOST_STEPS = 10_000
@@ -74,17 +80,25 @@ class BatchRun:
 
     def __init__(self, family: Family, width: int | None = None) -> None:
         self.width = width or recommended_width()
-        self._traced = family.traced
-        self._system = family.traced.system
-        self._precision = precision_of("double")
+        self._traced, self._system = family.traced, family.traced.system
         self._clocks: dict[int, SampleClock] = {}
-        self._motion = BatchMotion(family.traced, self.width)
-        self._outputs = BatchOutputs(family.traced)
+        system = self._system
+        self._crossings = [hy.expression(c.expression) for c in system.crossings]
+        self._components = [x for invariant in system.invariants for x in invariant.expressions]
+        grown = {r.first for r in system.recorded if r.name == GROWTH}
+        self._of_tangents = np.array([row in grown for row in range(len(system.outputs))])
+        pairs = list(zip(system.outputs, self._of_tangents, strict=True))
+        self._of_motion = [x for x, of_tangents in pairs if not of_tangents]
+        self._growth = [x for x, of_tangents in pairs if of_tangents]
 
     def compile(self) -> None:
         """Compile integrators and functions now rather than when the first members need them."""
-        self._motion.compile()
-        self._outputs.compile()
+        _ = self._plain, self._along
+        if self._components:
+            self._compiled(self._components)
+        self._compiled(self._of_motion)
+        if self._growth:
+            self._compiled(self._growth, along=True)
 
     def blocks(self, numbers: Numbers) -> Iterator[BatchBlock]:
         """Run members of this family, as many at a time as fit into memory."""
@@ -96,21 +110,22 @@ class BatchRun:
         for first in range(0, len(order), most):
             yield self._block(numbers, order[first : first + most])
 
-    # --- one block ------------------------------------------------------------------------------------------
-
     def _block(self, numbers: Numbers, part: np.ndarray) -> BatchBlock:
-        members, initial = numbers.members[part], numbers.initial[:, part]
-        swept = numbers.parameters[:, part]
-        units = numbers.whole_numbers(self._system.scaling.time)[part]
-        start, times = self._times(units)
-        moving = initial[: self._traced.moving]
+        initial, swept = numbers.initial[:, part], numbers.parameters[:, part]
+        moving, read = initial[: self._traced.moving], swept[self._traced.in_equations]
+        start, times = self._times(numbers.whole_numbers(self._system.scaling.time)[part])
         most = self._most_steps(start, times)
-        lanes, along = self._motion.run(initial, swept, start, times, most)
-        begun = self._outputs.begun(moving, swept, start)
-        values_of = self._outputs.at(lanes.states, swept, times, begun, along)
-        values, drifts = self._outputs.named(values_of, numbers, part)
+        parameters = np.concatenate([read, self._of_events(moving, swept, start, times[-1])])
+        lanes, along = self._plain.run(moving, parameters, start, times, most), None
+        if self._along is not None:
+            along = self._along.run(initial, read, start, times, most).states
+        begun = self._evaluated(self._components, moving[None], swept, start[None])[:, 0]
+        found = self._outputs(lanes.states, swept, times, begun, along)
+        values, first = self._in_si(found, numbers, part), len(found) - len(self._system.invariants)
+        self._join(values, numbers, part)
+        drifts = {f"{one.name}_drift": found[first + n] for n, one in enumerate(self._system.invariants)}
         block = BatchBlock(
-            members,
+            numbers.members[part],
             part,
             self._traced.prepared.clock.labels(0, len(times)),
             start,
@@ -122,12 +137,59 @@ class BatchRun:
             _reached(lanes),
             lanes.steps,
             self._traced.prepared.drift_bound(lanes.steps),
-            self._events(lanes, swept, numbers, part, units, begun),
+            self._events(lanes, swept, numbers, part, begun),
             self.width,
         )
         self._ended_by_events(block)
         self._ended_by_drift(block)
         return block
+
+    # --- integrators ------------------------------------------------------------------------------------
+
+    def _engine(self, states: int, events: Sequence[tuple[Any, int]] = ()) -> BatchEngine:
+        """Batch integrator of the first states of the system."""
+        system, tolerance = self._system, self._traced.prepared.tolerance
+        rights = self._traced.as_parameters([right for _, right in system.equations[:states]])
+        equations = list(zip(system.variables[:states], rights, strict=True))
+        loose = None if tolerance is None else float(tolerance)
+        return BatchEngine(BatchSystem(equations, list(events), loose, system.wide), self.width)
+
+    @cached_property
+    def _plain(self) -> BatchEngine:
+        """The motion; each event has a shift and a factor as parameters after those of the equations."""
+        expressions, first = self._traced.as_parameters(self._crossings), len(self._traced.in_equations)
+        events = [
+            ((expression + hy.par[first + 2 * n]) * hy.par[first + 2 * n + 1], crossing.direction)
+            for n, (expression, crossing) in enumerate(zip(expressions, self._system.crossings, strict=True))
+        ]
+        return self._engine(self._traced.moving, events)
+
+    @cached_property
+    def _along(self) -> BatchEngine | None:
+        states = len(self._system.states)
+        return self._engine(states) if states > self._traced.moving else None
+
+    def _of_events(
+        self, initial: np.ndarray, swept: np.ndarray, start: np.ndarray, end: np.ndarray
+    ) -> np.ndarray:
+        """Parameters (2 * events, members) of the events' expressions."""
+        found = np.zeros((2 * len(self._crossings), len(start)))
+        if not self._crossings:
+            return found
+        random = np.random.default_rng(0).uniform(-1.0, 1.0, (STATES, len(initial)))
+        states = np.repeat(random[:, :, None], len(start), axis=2)
+        states[0] = initial
+        largest: np.ndarray = np.zeros((len(self._crossings), len(start)))
+        with np.errstate(all="ignore"):
+            at_start = self._evaluated(self._crossings, initial[None], swept, start[None])[:, 0]
+            for part in TIMES:
+                times = np.broadcast_to(start + part * (end - start), (STATES, len(start)))
+                values = self._evaluated(self._crossings, states, swept, times)
+                values = np.where(np.isfinite(values), np.abs(values), 0.0)
+                largest = np.fmax(largest, values.max(axis=1))
+        found[0::2] = np.where(at_start == 0, 2.0 ** (-_DOUBLE.bits - BESIDE), 0.0)
+        found[1::2] = np.ldexp(1.0, -exponents_of(largest))
+        return found
 
     def _times(self, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Start (m,) and samples (samples, m) in each member's internal unit of time."""
@@ -135,7 +197,7 @@ class BatchRun:
         for unit in np.unique(units).tolist():
             if unit not in self._clocks:
                 scaling = replace(self._system.scaling, time=unit)
-                self._clocks[unit] = SampleClock(self._system.scene.samples, self._precision, scaling)
+                self._clocks[unit] = SampleClock(self._system.scene.samples, _DOUBLE, scaling)
             clock, same = self._clocks[unit], units == unit
             start[same] = clock.start
             columns[:, same] = clock.internal(0, clock.count)[:, None]
@@ -158,27 +220,20 @@ class BatchRun:
     # --- events and guards ----------------------------------------------------------------------------------
 
     def _events(
-        self,
-        lanes: LaneResults,
-        swept: np.ndarray,
-        numbers: Numbers,
-        part: np.ndarray,
-        units: np.ndarray,
-        begun: np.ndarray,
+        self, lanes: LaneResults, swept: np.ndarray, numbers: Numbers, part: np.ndarray, begun: np.ndarray
     ) -> list[BatchEvents]:
-        events = []
+        events, scaling = [], self._system.scaling
         for index, crossing in enumerate(self._system.crossings):
             rows = [(m, f) for m, found in lanes.found.items() for f in found if f.event == index]
             rows.sort(key=lambda row: (row[0], row[1].time))
-            place = np.array([m for m, _ in rows], dtype=np.int64)
-            times = np.array([f.time for _, f in rows])
-            values = {v.name: np.zeros((0, v.count)) for v in self._system.recorded}
-            if rows:
-                states = np.array([f.state for _, f in rows]).T[None]
-                at = self._outputs.at(states, swept[:, place], times[None], begun[:, place])
-                values = self._outputs.named_at_events(at, numbers, part[place])
-            seconds = self._system.scaling.direction * np.ldexp(times, units[place]) if rows else times
-            events.append(BatchEvents(crossing.name, place, seconds, values))
+            place, times = np.array([m for m, _ in rows], dtype=np.int64), np.array([f.time for _, f in rows])
+            states = np.array([f.state for _, f in rows]).reshape(len(rows), lanes.states.shape[1])
+            at = self._outputs(states.T[None], swept[:, place], times[None], begun[:, place])
+            values = {name: x[0] for name, x in self._in_si(at, numbers, part[place]).items()}
+            units = numbers.whole_numbers(scaling.time)[part[place]]
+            events.append(
+                BatchEvents(crossing.name, place, scaling.direction * np.ldexp(times, units), values)
+            )
         return events
 
     def _ended_by_events(self, block: BatchBlock) -> None:
@@ -208,105 +263,27 @@ class BatchRun:
             block.status[m] = Status.MAX_DRIFT
             _end(block, m, int(np.argmax(beyond[:, m])) + 1)
 
+    # --- what is recorded -------------------------------------------------------------------------------
 
-def _reached(lanes: LaneResults) -> np.ndarray:
-    """Number of samples that each member reached, (members,)."""
-    found = np.full(len(lanes.arrived), len(lanes.states))
-    short = np.flatnonzero(~lanes.arrived)
-    finite = np.isfinite(lanes.states[:, :, short]).all(axis=1)
-    found[short] = np.where(finite.all(axis=0), len(finite), np.argmin(finite, axis=0))
-    return found
-
-
-def _end(block: BatchBlock, member: int, samples: int) -> None:
-    block.reached[member] = samples
-    for values in (*block.values.values(), *block.drifts.values()):
-        values[samples:, member] = np.nan
-
-
-# --- what is recorded ---------------------------------------------------------------------------------------
-
-
-class BatchOutputs:
-    """Recorded variables and drifts of a traced system.
-
-    The growth of tangent vectors has a separate function, of states that the motion alone lacks; together
-    with it the code of the others would be compiled differently.
-    """
-
-    def __init__(self, traced: TracedSystem) -> None:
-        self._traced = traced
-        self._system = traced.system
-        self._growth = {r.first for r in self._system.recorded if r.name == GROWTH}
-
-    def _compiled(self, expressions: list[Any], states: int) -> tuple[Any, list[int]]:
-        """A compiled function of states, and the indices of the states and parameters that it takes."""
-        variables = [*self._system.variables[:states], *self._traced.parameters.variables]
-        names = set(hy.get_variables([hy.expression(x) for x in expressions]))
-        read = [n for n, variable in enumerate(variables) if str(variable) in names] or [0]
-        taken = [variables[n] for n in read]
-        wide = self._system.wide
-        return compiled_function(expressions, taken, compact_mode=wide, fp_type=float), read
-
-    @cached_property
-    def _parts(self) -> tuple[list[int], list[Any], list[Any]]:
-        """Rows and expressions of the outputs of the motion alone, and the growth's expressions."""
-        outputs = list(enumerate(self._system.outputs))
-        of_motion = [(row, x) for row, x in outputs if row not in self._growth]
-        growth = [x for row, x in outputs if row in self._growth]
-        return [row for row, _ in of_motion], [x for _, x in of_motion], growth
-
-    @cached_property
-    def _components(self) -> list[Any]:
-        return [x for invariant in self._system.invariants for x in invariant.expressions]
-
-    def compile(self) -> None:
-        """Compile the functions that ``begun`` and ``at`` call."""
-        _, of_motion, growth = self._parts
-        for expressions in filter(None, (self._components, of_motion)):
-            self._compiled(expressions, self._traced.moving)
-        if growth:
-            self._compiled(growth, len(self._system.states))
-
-    def begun(self, initial: np.ndarray, swept: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """Invariants' components at the start (components, m), for the motion's states (states, m)."""
-        return self._evaluated(self._components, initial[None], swept, start[None])[:, 0]
-
-    def at(
+    def _outputs(
         self,
         states: np.ndarray,
         swept: np.ndarray,
         times: np.ndarray,
         begun: np.ndarray,
         along: np.ndarray | None = None,
-    ) -> list[np.ndarray]:
-        """All outputs, each (samples, m), of states (samples, states, m) and times (samples, m), internal
+    ) -> np.ndarray:
+        """All outputs (outputs, samples, m) of states (samples, states, m) and times (samples, m), internal
         units; ``along`` has tangent vectors, without which their growth is unknown.
         """
-        rows, of_motion, growth = self._parts
-        found = self._evaluated(of_motion, states, swept, times, begun)
-        table = dict(zip(rows, found, strict=True))
-        if growth:
-            lost = np.full(times.shape, np.nan)
-            grown = [lost] if along is None else self._evaluated(growth, along, swept, times)
-            table |= dict(zip(sorted(self._growth), grown, strict=True))
-        return [table[row] for row in range(len(table))]
+        found = np.full((len(self._system.outputs), *times.shape), np.nan)
+        found[~self._of_tangents] = self._evaluated(self._of_motion, states, swept, times, begun)
+        if along is not None:
+            found[self._of_tangents] = self._evaluated(self._growth, along, swept, times)
+        return found
 
-    def named(self, found: Sequence[np.ndarray], numbers: Numbers, part: np.ndarray) -> tuple[Values, Values]:
-        """Outputs, each (samples, m), as recorded variables (samples, m, components), SI, and drifts."""
-        values = self._in_si(found, numbers, part)
-        first = len(self._system.outputs) - len(self._system.invariants)
-        drifts = {
-            f"{invariant.name}_drift": found[first + n] for n, invariant in enumerate(self._system.invariants)
-        }
-        self._join(values, numbers, part)
-        return values, drifts
-
-    def named_at_events(self, found: Sequence[np.ndarray], numbers: Numbers, members: np.ndarray) -> Values:
-        """Outputs at members' crossings, (1, n) each, as recorded variables (n, components), SI."""
-        return {name: values[0] for name, values in self._in_si(found, numbers, members).items()}
-
-    def _in_si(self, found: Sequence[np.ndarray], numbers: Numbers, members: np.ndarray) -> Values:
+    def _in_si(self, found: np.ndarray, numbers: Numbers, members: np.ndarray) -> Values:
+        """Outputs as recorded variables (samples, m, components), SI."""
         values: Values = {}
         for variable in self._system.recorded:
             columns = [
@@ -322,15 +299,25 @@ class BatchOutputs:
             if variable.continuity != "nearest":
                 continue
             block = values[variable.name]
-            begin = [numbers.doubles(x)[part] for x in self._traced.system.scene.quaternion]
+            begin = [numbers.doubles(x)[part] for x in self._system.scene.quaternion]
             before = np.concatenate([np.stack(begin, axis=1)[None], block[:-1]])
             products = np.einsum("smc,smc->sm", block, before)
             signs = np.cumprod(np.where(products < 0, -1.0, 1.0), axis=0)
             block *= signs[:, :, None]
 
+    def _compiled(self, expressions: Sequence[Any], along: bool = False) -> tuple[Any, list[int]]:
+        """A compiled function of states, and the indices of the states and parameters that it takes."""
+        states = len(self._system.states) if along else self._traced.moving
+        variables = [*self._system.variables[:states], *self._traced.parameters.variables]
+        names = set(hy.get_variables([hy.expression(x) for x in expressions]))
+        read = [n for n, variable in enumerate(variables) if str(variable) in names] or [0]
+        taken = [variables[n] for n in read]
+        made = compiled_function(expressions, taken, compact_mode=self._system.wide, fp_type=float)
+        return made, read
+
     def _evaluated(
         self,
-        expressions: list[Any],
+        expressions: Sequence[Any],
         states: np.ndarray,
         swept: np.ndarray,
         times: np.ndarray,
@@ -338,9 +325,9 @@ class BatchOutputs:
     ) -> np.ndarray:
         """Values (expressions, samples, m) for states (samples, states, m) and times (samples, m)."""
         samples, count, m = states.shape
-        if not expressions:
-            return np.empty((0, samples, m))
-        function, read = self._compiled(expressions, count)
+        if not expressions or not times.size:
+            return np.empty((len(expressions), samples, m))
+        function, read = self._compiled(expressions, count > self._traced.moving)
         # parameters of members are inputs like their states
         every = (samples, m)
         rows = [states[:, n] if n < count else np.broadcast_to(swept[n - count], every) for n in read]
@@ -350,3 +337,18 @@ class BatchOutputs:
             constants = np.repeat(begun[:, None], samples, axis=1).reshape(len(begun), -1)
         found = evaluate_rows(function, inputs.T, constants, times.ravel())
         return found.reshape(len(expressions), samples, m)
+
+
+def _reached(lanes: LaneResults) -> np.ndarray:
+    """Number of samples that each member reached, (members,)."""
+    found = np.full(len(lanes.arrived), len(lanes.states))
+    short = np.flatnonzero(~lanes.arrived)
+    finite = np.isfinite(lanes.states[:, :, short]).all(axis=1)
+    found[short] = np.where(finite.all(axis=0), len(finite), np.argmin(finite, axis=0))
+    return found
+
+
+def _end(block: BatchBlock, member: int, samples: int) -> None:
+    block.reached[member] = samples
+    for values in (*block.values.values(), *block.drifts.values()):
+        values[samples:, member] = np.nan

@@ -19,6 +19,7 @@ import numpy as np
 
 from rigidsim.model.step_limiter import slopes
 from rigidsim.model.system import System
+from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.switching.moments import Moments
 
@@ -83,48 +84,49 @@ class SurfaceFunctions:
             terms = [slope * hy.make_vars(name) for name, slope in by_state.items()]
             terms += [slope * hy.time for slope in explicit]
             changes.append(hy.sqrt(hy.sum([term * term for term in terms])))
-        options = {"compact_mode": True, **precision.options}
         spin = [hy.sum([w * w for w in system.mechanics.rates])] if self.unturned else []
-        self._turned = hy.cfunc([*system.turning, *system.signed, *spin, *named], variables, **options)
         found = [c.expression for c in system.crossings]
         sizes = [[g * g for g in slopes(expression)[1].values()] for expression in found]
         lengths = [hy.sqrt(hy.sum(squares)) if squares else hy.expression(0.0) for squares in sizes]
-        self._crossings = hy.cfunc([*found, *lengths, *named], variables, **options)
-        self._beside = hy.cfunc([*system.surfaces, *changes, *named], variables, **options)
+        often = [*system.turning, *system.signed, *spin], [*found, *lengths], [*system.surfaces, *changes]
+        self._ends = np.cumsum([len(part) for part in often])
         outputs = [*system.surfaces, *by_time, *rates, *gradients, *fields, *named]
-        self._everything = hy.cfunc(outputs, variables, **options)
+        self._often, self._everything = (
+            compiled_function(given, variables, compact_mode=True, **precision.options)
+            for given in ([*often[0], *often[1], *often[2], *named], outputs)
+        )
+
+    def _turned(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> list[float]:
+        found = self._often(np.array(state), pars=pars, time=time)
+        return [float(x) for x in found[: self._ends[0]]]
 
     def plain(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> tuple[list[float], list[float]]:
         """The plain angles, and the plain quaternion, where turns are continued."""
-        found = [float(x) for x in self._turned(np.array(state), pars=pars, time=time)[:-3]]
+        found = self._turned(state, time, pars)[:-1]
         return found[: self._angles], found[self._angles :]
 
     def spin(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> float:
         """The body's angular velocity, rad per internal unit of time, where turns are continued."""
-        return math.sqrt(float(self._turned(np.array(state), pars=pars, time=time)[-3]))
+        return math.sqrt(self._turned(state, time, pars)[-1])
 
-    def crossings(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> list[tuple[float, float]]:
-        """Values of the events' expressions, and the effect on them of rounding in states of order one."""
-        found = [float(x) for x in self._crossings(np.array(state), pars=pars, time=time)[:-2]]
-        noise, half = _RATE_ROUNDINGS * self._epsilon, len(found) // 2
-        return [(value, noise * size) for value, size in zip(found[:half], found[half:], strict=True)]
-
-    def crosses_too(self, states: np.ndarray, times: np.ndarray, pars: np.ndarray) -> np.ndarray:
-        """At which of many states an event's expression is zero but for rounding (n,)."""
-        found = np.abs(_by_columns(self._crossings, states, times, pars)[:-2])
-        half = len(found) // 2
-        return np.asarray((found[:half] <= _RATE_ROUNDINGS * self._epsilon * found[half:]).any(axis=0))
+    def crossings(self, states: np.ndarray, times: np.ndarray, pars: np.ndarray) -> np.ndarray:
+        """Values of the events' expressions at many states, and the effect on them of rounding in states of
+        order one, (2, events, n).
+        """
+        found = _by_columns(self._often, states, times, pars)[self._ends[0] : self._ends[1]]
+        values, sizes = np.split(found, 2)
+        return np.array([values, _RATE_ROUNDINGS * self._epsilon * sizes])
 
     def beside(self, state: np.ndarray, time: Scalar, pars: np.ndarray, j: int) -> float:
         """A size well above an argument's rounding, which is added to its event beside its zero."""
-        found = self._beside(state, pars=pars, time=time)
+        found = self._often(state, pars=pars, time=time)[self._ends[1] :]
         noise = max(_ROUNDINGS * float(found[self._surfaces + j]), _LEAST)
         return 2 * abs(float(found[j])) + self._epsilon * noise
 
     def asks(self, states: np.ndarray, times: np.ndarray, pars: np.ndarray, sides: np.ndarray) -> np.ndarray:
         """At which of many states (n,) an argument isn't well on its side (n, surfaces)."""
-        found = _by_columns(self._beside, states, times, pars)
-        u, sizes = found[: self._surfaces], found[self._surfaces : 2 * self._surfaces]
+        found = _by_columns(self._often, states, times, pars)[self._ends[1] : self._ends[2]]
+        u, sizes = np.split(found, 2)
         return np.asarray((sides.T * u <= _CLOSE * self._epsilon * (sizes + 1.0)).any(axis=0))
 
     def looks(self, states: np.ndarray, times: np.ndarray, pars: np.ndarray) -> SurfaceValues:
@@ -137,12 +139,17 @@ class SurfaceFunctions:
 
     def look(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> SurfaceValues:
         """The same at one state."""
-        return self.looks(np.array([state]), np.array([time], dtype=state.dtype), pars[None])
+        return self.looks(*one(state, time, pars))
 
     def exact(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Arguments and gradients (surfaces, states) in the run's precision."""
         found, s = self._everything(np.array(state), pars=pars, time=time), self._surfaces
         return found[:s], found[3 * s : (3 + self._states) * s].reshape(s, self._states)
+
+
+def one(state: np.ndarray, time: Scalar, pars: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """One state, time and set of parameters as many."""
+    return np.array([state]), np.array([time], dtype=state.dtype), pars[None]
 
 
 def _by_columns(function: Any, states: np.ndarray, times: np.ndarray, pars: np.ndarray) -> np.ndarray:

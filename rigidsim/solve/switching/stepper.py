@@ -44,6 +44,7 @@ from rigidsim.solve.switching.sides import (
     SurfaceFunctions,
     SurfaceValues,
     crossings,
+    one,
 )
 from rigidsim.solve.switching.sliding import MOST_AT_ONCE, sliding
 from rigidsim.solve.switching.turned import MOST, Turned
@@ -69,18 +70,14 @@ class _Passed(NamedTuple):
     """A boundary that was passed among many, with what its step may have to be taken back for.
 
     Attributes:
-        crossed: number of the surface on which the step ended, from 1; 0 for none.
-        switches: count of the latest switches, and since when.
-        series: Taylor coefficients of the step if it began on a surface, (states, order + 1).
+        crossed: the surface on which the step ended; -1 for none.
         samples: number of samples taken up to here.
+        series: Taylor coefficients of the step if it began on a surface, (states, order + 1).
     """
 
-    time: tuple[Scalar, Scalar]
-    state: np.ndarray
+    mark: Mark
     pars: np.ndarray
     crossed: int
-    switches: tuple[int, float]
-    events: int
     samples: int
     size: float
     series: np.ndarray | None
@@ -142,16 +139,10 @@ class SwitchingStepper(TaylorStepper):
         return self._functions_by_chart[self._chart]
 
     def mark(self) -> Mark:
-        mark = super().mark()
-        sides = (
-            *map(float, self._modes),
-            *self._turned.angles,
-            *self._turned.quaternion,
-            float(self._crossed),
-            float(self._count),
-            self._since,
-        )
-        return replace(mark, memory=(mark.memory, sides))
+        engine, turned = self._integrator, self._turned
+        sides = *self._modes, *turned.angles, *turned.quaternion, self._crossed, self._count, self._since
+        memory = self._tiny, sides
+        return Mark(engine.dtime, np.array(engine.state), len(self.log.found), self.steps, memory)
 
     def back_to(self, mark: Mark) -> None:
         tiny, sides = mark.memory
@@ -320,7 +311,8 @@ class SwitchingStepper(TaylorStepper):
             moved[j] = self._modes[j] * _FAR_OFF
         if self.has_events:
             moved += [
-                self._event_offset(*found) for found in self._functions.crossings(self.state, self.time, pars)
+                self._event_offset(value, noise)
+                for value, noise in self._functions.crossings(*one(self.state, self.time, pars))[..., 0].T
             ]
         everything = np.concatenate([pars, _scalars(self.precision, moved)])
         engine.pars[:] = everything[: len(engine.pars)]  # those that nothing reads have no meaning
@@ -390,30 +382,14 @@ class SwitchingStepper(TaylorStepper):
         alone = alone or (kept == len(passed) and (self._halted or outcome == hy.taylor_outcome.err_nf_state))
         self._ahead = min(2 * self._ahead, _MOST_AHEAD) if kept == len(passed) else max(kept, 1)
         if alone or kept < len(passed):
-            self._back_among(begun, known, passed[:kept], samples)
+            self.back_to(passed[kept - 1].mark if kept else begun)
+            if samples is not None:
+                samples.back_to(passed[kept - 1].samples if kept else known)
         if kept:
             sizes = [one.size for one in passed[:kept]]
-            self.smallest, self.largest = min(sizes), max(sizes)
-            self._crossed, self._dense = passed[kept - 1].crossed, engine
-            self.steps = begun.steps + kept
+            self.smallest, self.largest, self._dense = min(sizes), max(sizes), engine
             self._judge(begun.time[0], kept)
         return alone
-
-    def _back_among(
-        self, begun: Mark, known: int, passed: list[_Passed], samples: SamplesWithin | None
-    ) -> None:
-        """Go back to the last of the boundaries passed, or to where they began."""
-        found = self.log.found[:]
-        self.back_to(begun)
-        if passed:
-            last, self.log.found[:] = passed[-1], found
-            begun = replace(begun, time=last.time, state=last.state, events=last.events)
-            self._modes = [1 if side > 0 else -1 for side in last.pars[: len(self._modes)]]
-            self._count, self._since = last.switches
-            TaylorStepper.back_to(self, replace(begun, memory=begun.memory[0]))
-            known = last.samples
-        if samples is not None:
-            samples.back_to(known)
 
     def _crosses(self, engine: TaylorEngine, j: int, side: int) -> bool:
         """Go on beyond a surface on which a step ended among many; False if that has to be looked into."""
@@ -445,19 +421,10 @@ class SwitchingStepper(TaylorStepper):
         samples = self._samples
         going = samples is None or samples(engine)
         assert self._passed is not None
-        self._passed.append(
-            _Passed(
-                time,
-                np.array(engine.state),
-                np.array(self._now),
-                crossed,
-                (self._count, self._since),
-                len(self.log.found),
-                0 if samples is None else len(samples.states),
-                abs(float(engine.last_h)),
-                np.array(engine.tc) if self._fresh else None,
-            )
-        )
+        self.steps, self._crossed = self.steps + 1, crossed
+        taken = 0 if samples is None else len(samples.states)
+        series, size = np.array(engine.tc) if self._fresh else None, abs(float(engine.last_h))
+        self._passed.append(_Passed(self.mark(), np.array(self._now), crossed - 1, taken, size, series))
         if not crossed:
             self.log.quiet_until = None
         self._offset, self._cut, self._fresh = offset, None, bool(crossed)
@@ -471,10 +438,9 @@ class SwitchingStepper(TaylorStepper):
         """
         if not passed:
             return 0, False
-        states = np.array([begun.state, *(one.state for one in passed)])
-        times = np.array([one.time[0] for one in passed])
-        pars = np.array([one.pars for one in passed])
-        crossed = np.array([one.crossed - 1 for one in passed])
+        states = np.array([begun.state, *(one.mark.state for one in passed)])
+        times = np.array([one.mark.time[0] for one in passed])
+        pars, crossed = np.array([one.pars for one in passed]), np.array([one.crossed for one in passed])
         sides = np.where(pars[:, : len(self._modes)] > 0, 1.0, -1.0)
         bad, near = np.zeros((2, len(passed)), dtype=bool)
         rows = np.flatnonzero((crossed >= 0) | self._functions.asks(states[1:], times, pars, sides))
@@ -511,7 +477,10 @@ class SwitchingStepper(TaylorStepper):
         narrow = np.array([self._moments.may_mistake(j) for j in crossed])
         there = ~narrow | (np.abs(looks[0].u) <= _MISTAKEN * noises)[crossed, rows]
         found = there & (least > np.max([look.rate_noises[crossed, rows] for look in looks], axis=0))
-        return found & ~self._functions.crosses_too(states, times, pars) if self.has_events else found
+        if self.has_events:
+            value, noise = self._functions.crossings(states, times, pars)
+            found &= ~(np.abs(value) <= noise).any(axis=0)
+        return found
 
     # --- one step -------------------------------------------------------------------------------------------
 
@@ -597,12 +566,11 @@ class SwitchingStepper(TaylorStepper):
         found, width = self.log.found[known:], self._width(self.time)
         noted = {event.index for event in found if event.time >= self.time - width}
         pars = self._parameters()
-        earlier, here = (
-            self._functions.crossings(*place, pars) for place in ((before, begun), (self.state, self.time))
-        )
-        for i, ((value, _), (now, noise)) in enumerate(zip(earlier, here, strict=True)):
-            direction = self.system.crossings[i].direction
-            if i not in noted and abs(now) <= noise < abs(value) and direction * value <= 0:
+        states, times = np.array([before, self.state]), np.array([begun, self.time], dtype=before.dtype)
+        values, noises = self._functions.crossings(states, times, np.array([pars, pars]))
+        crossed = (np.abs(values[:, 1]) <= noises[:, 1]) & (noises[:, 1] < np.abs(values[:, 0]))
+        for i in np.flatnonzero(crossed).tolist():
+            if i not in noted and self.system.crossings[i].direction * values[i, 0] <= 0:
                 self.log.note(i, self.time, self.state)
 
     def _natural(self, until: Scalar | None, longest: Scalar) -> bool:
