@@ -80,7 +80,7 @@ def _load_blocks(m: Mechanics) -> list[StateBlock]:
         if (orbit := load.orbit) is not None and orbit not in carried:
             carried.add(orbit)
             titles = ", ".join(dict.fromkeys(x.title for x in m.loads if x.orbit == orbit))
-            block = m.orbit_block(orbit)
+            block = m.orbit(orbit).block
             blocks.append(replace(block, why=block.why or f"{titles}: where its source is"))
         if (table := load.table) is not None and table not in carried:
             carried.add(table)

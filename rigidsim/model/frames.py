@@ -40,7 +40,6 @@ from rigidsim.model.load import Load, loads_of
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.orbit_planes import FlightPlane, KeplerPlane, OrbitPlane, TablePlane
 from rigidsim.model.rotations import Symbolic, along, apply, transpose, unit
-from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Matrix, Vector, cross, norm
 from rigidsim.scene.frame import ORBIT
 from rigidsim.scene.orbits import KeplerOrbit
@@ -203,8 +202,6 @@ def moves_slowly_in_orbit(m: Mechanics) -> bool:
 
 
 def _normal(m: Mechanics, load: Load, down: list[Symbolic]) -> tuple[list[Symbolic], str]:
-    if m.attitude is not None and m.attitude.orbital is not None:
-        return m.attitude.orbital.normal, "normal of its orbit"
     plane = plane_of(load)
     if plane is not None and plane.called:
         return apply(transpose(m.matrix), plane.normal(m)), plane.called
@@ -242,12 +239,7 @@ def jacobi_constant(m: Mechanics) -> Symbolic:
     """H, internal units of energy."""
     orbit, context = m.carried(rotating_orbit(m)), m.scene.context
     motion = context.ldexp(orbit.mean_motion, m.scaling.time)
-    if m.attitude is not None and m.attitude.orbital is not None:
-        factor = as_factor(m.number(motion))
-        normal_body = m.attitude.orbital.normal
-        carried = [factor * (o * x) for o, x in zip(normal_body, m.momentum_body, strict=True)]
-    else:
-        pairs = zip(orbit.normal(context), m.momentum_space, strict=True)
-        carried = [m.number(motion * o) * x for o, x in pairs if o != 0]
+    pairs = zip(orbit.normal(context), m.momentum_space, strict=True)
+    carried = [m.number(motion * o) * x for o, x in pairs if o != 0]
     potentials = [m.carried(load.potential(m)) for load in m.turning]
     return m.kept_rotational_energy - hy.sum(carried) + reduce(add, potentials)

@@ -18,7 +18,7 @@ from rigidsim.model.orbits.point_mass_states import PointMassStates
 from rigidsim.model.orbits.prescribed import OrbitStates, TablePlace, orbit_states, table_states
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix, apply, length, transpose
 from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling
-from rigidsim.model.state_blocks import BODY, AttitudeStates, RotatingBody, StateBlock
+from rigidsim.model.state_blocks import BODY, AttitudeStates, RotatingBody
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot, negligible
 from rigidsim.scene.epochs import Epoch
@@ -54,8 +54,6 @@ class Kinematics:
     _orbits: dict[KeplerOrbit | TabulatedOrbit, OrbitStates] = field(
         default_factory=dict, init=False, repr=False
     )
-    seen_so_far: list[list[Symbolic]] = field(default_factory=list, init=False, repr=False, compare=False)
-    """Results of ``seen``; some may be there several times."""
     made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
     """Long vectors that several expressions share, by what they are."""
 
@@ -133,9 +131,7 @@ class Kinematics:
 
     def seen(self, space: list[Symbolic]) -> list[Symbolic]:
         """A vector of space axes that doesn't depend on how the body turns, in body axes."""
-        found = apply(transpose(self.matrix), space)
-        self.seen_so_far.append(found)
-        return found
+        return apply(transpose(self.matrix), space)
 
     @property
     def marked(self) -> Vector | None:
@@ -211,12 +207,6 @@ class Kinematics:
             made = table_states(orbit, place, self.scaling.time, self.scene.start, self.number)
             self._orbits[orbit] = made
         return self._orbits[orbit]
-
-    def orbit_block(self, orbit: KeplerOrbit) -> StateBlock:
-        """The states that carry an orbit: those of the orbital frame, if the attitude is carried in it."""
-        if self.attitude is not None and self.attitude.orbital is not None:
-            return self.attitude.orbital.states
-        return self.orbit(orbit).block
 
 
 def in_common_unit(states: list[Symbolic], units: list[Any], number: Rounder) -> list[Symbolic]:

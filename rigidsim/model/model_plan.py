@@ -116,7 +116,7 @@ def _choose_formulation(
     if asked == AUTO:
         if not requirements.attitude:
             return Rates(), requirements
-        return Planar.by_gradients(scene, loads) or Quaternion.of(scene, loads), requirements
+        return Planar.by_gradients(scene, loads) or Quaternion(), requirements
     try:
         return REGISTERED[asked].of(scene, loads), requirements
     except Unsuited as why:

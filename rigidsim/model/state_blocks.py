@@ -54,15 +54,6 @@ class StateBlock:
 
 
 @dataclass(frozen=True)
-class OrbitalFrame:
-    """Quantities of the orbital frame, for an attitude carried relative to a circular orbit; body axes."""
-
-    direction: list[Symbolic]  # unit vector towards the attracting body
-    normal: list[Symbolic]  # unit normal of the orbit
-    states: StateBlock  # of the orbit itself, from which the attitude in space follows
-
-
-@dataclass(frozen=True)
 class AttitudeStates:
     """The part of a system of equations that carries the attitude; the first three as in ``StateBlock``.
 
@@ -80,7 +71,6 @@ class AttitudeStates:
     defect: tuple[str, str, Symbolic] | None = None  # name, long name and value of what stays by construction
     singular_factor: Symbolic | None = None  # vanishes where the states are singular
     sequence: str = ""  # of Euler angles, if that is what the states are
-    orbital: OrbitalFrame | None = None  # if the states are the attitude relative to it
     angle_unit: int = 0  # binary exponent of the unit in which such angles are carried, rad
     chord: float | None = None  # rad between attitudes at a small distance of 1, if the same everywhere
     momenta: tuple[str, ...] = ()  # further states of the rotation in the place of the body rates

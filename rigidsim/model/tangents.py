@@ -13,7 +13,6 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import heyoka as hy
 
-from rigidsim.model.formulations.planar import ANGLE, SPIN
 from rigidsim.model.heyoka_expressions import TANGENT
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import Observable, only_when_named
@@ -73,10 +72,8 @@ def tangent_block(m: Mechanics, before: Sequence[StateBlock]) -> StateBlock:
     places = [n for n, name in enumerate(whole.names) if name in moving]
     names = [whole.names[n] for n in places]
     rights = [whole.derivatives[n] for n in places]
-    rates = _of_a_turn(m, names, rights)
-    if rates is None:
-        along = [hy.make_vars(TANGENT + name) for name in names]
-        rates = _varied([variables[n] for n in places], rights, along)
+    along = [hy.make_vars(TANGENT + name) for name in names]
+    rates = _varied([variables[n] for n in places], rights, along)
     start = _direction(m, own)
     return StateBlock(
         [TANGENT + name for name in names],
@@ -101,50 +98,6 @@ def _varied(
     to: dict[Symbolic, Symbolic] = {old: new for (old, _), new in zip(varied, along, strict=True)}
     to |= {constant: variable for variable, constant in constants.items()}
     return [hy.subs(right, to) for _, right in varied]
-
-
-def _of_a_turn(m: Mechanics, names: Sequence[str], rights: Sequence[Symbolic]) -> list[Symbolic] | None:
-    """Rates of the tangent vector of a planar motion whose torque sees its angle in vectors of space alone,
-    or None.
-
-    Seen from a body that turns about its axis k, such a vector c has dc/d(angle) = -k x c: written with its
-    own components, the derivative of a gradient's torque takes four products of series instead of nine.
-    """
-    about = _axis_of_turn(m) if list(names) == [ANGLE, SPIN] else None
-    if about is None or m.attitude is None:
-        return None
-    axis, sign = about
-    components: dict[Symbolic, Symbolic] = {}
-    slopes: list[Symbolic] = []
-    for vector in m.seen_so_far:
-        pair = [vector[(axis + 1) % 3], vector[(axis + 2) % 3]]
-        if pair[0] in components or not any(ANGLE in hy.get_variables(x) for x in pair):
-            continue
-        across = [hy.make_vars(f"seen_{len(components) + n}") for n in range(2)]
-        components |= dict(zip(pair, across, strict=True))
-        slopes += [across[1], -across[0]] if sign > 0 else [-across[1], across[0]]
-    torque = hy.subs(rights[1], components)
-    if not components or ANGLE in hy.get_variables(torque):
-        return None
-    tangent_angle, tangent_spin, spin, turned = hy.make_vars(TANGENT + ANGLE, TANGENT + SPIN, SPIN, "turned")
-    states = [*components.values(), turned]
-    slope = _varied(states, [*slopes, torque], [*slopes, turned])[-1]
-    slope = hy.subs(slope, {new: old for old, new in components.items()})
-    rate = slope * (2.0**m.attitude.angle_unit * tangent_angle)
-    if SPIN in hy.get_variables(torque):
-        rate = rate + hy.diff(rights[1], spin) * tangent_spin
-    return [hy.subs(rights[0], {spin: tangent_spin}), rate]
-
-
-def _axis_of_turn(m: Mechanics) -> tuple[int, int] | None:
-    """The body axis that a planar motion turns about, and its sign; None if it is none of the three."""
-    one = {hy.make_vars(SPIN): hy.expression(1.0)}
-    try:
-        along = [float(str(hy.subs(rate, one))) for rate in m.rates]
-    except ValueError:  # an axis that differs between members of a sweep
-        return None
-    axis = max(range(3), key=lambda n: abs(along[n]))
-    return (axis, int(along[axis])) if sorted(map(abs, along)) == [0.0, 0.0, 1.0] else None
 
 
 def _weights(m: Mechanics, names: Sequence[str]) -> list[int]:

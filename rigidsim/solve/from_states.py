@@ -45,7 +45,7 @@ class AnyStart:
         flight = (*BODY.position, *BODY.velocity)
         self.flies = all(name in names for name in flight)
         self._flight = [names.index(name) for name in flight] if self.flies else []
-        orbits = [self._system.mechanics.orbit_block(tag).names for tag in self._system.plan.orbit_tags]
+        orbits = [self._system.mechanics.orbit(tag).block.names for tag in self._system.plan.orbit_tags]
         known = {WORK, PACE, *(name for block in orbits for name in block)}
         taken = {names[place] for place in (*self._places, *self._flight)}
         self.others = [name for name in names if name not in known | taken]

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import heyoka as hy
 
 from rigidsim.model import rotations
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, formulates
-from rigidsim.model.formulations.orbital_frame import OrbitalQuaternion
-from rigidsim.model.load import Load
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import BODY, AttitudeStates
@@ -20,11 +16,6 @@ from rigidsim.scene.scene import Scene
 @formulates(FORMULATIONS[DEFAULT_FORMULATION])
 class Quaternion(Formulation):
     """q' = q (0, w) / 2."""
-
-    @classmethod
-    def of(cls, scene: Scene, loads: Sequence[Load]) -> Formulation:
-        """In space axes, or where that is cheaper relative to an orbit's frame."""
-        return OrbitalQuaternion.if_cheaper(scene, loads) or cls()
 
     def attitude(self, plan: ModelPlan, rates: list[Symbolic], number: Rounder) -> AttitudeStates:
         return quaternion_states(plan.scene, rates)

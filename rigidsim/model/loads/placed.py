@@ -36,8 +36,6 @@ class Placed(Load):
     def seen(self, m: Kinematics) -> tuple[list[Symbolic], SourcePlace]:
         """``SourcePlace.line`` in body axes, and the place."""
         place = self.placement.seen(m)
-        if m.attitude is not None and m.attitude.orbital is not None:
-            return m.attitude.orbital.direction, place
         return m.seen(place.line), place
 
     def source_direction(self, m: Kinematics) -> list[Symbolic]:
