@@ -1,4 +1,4 @@
-"""Estimates of loads of unknown size, from which units and drift scales are chosen.
+"""Loads of unknown size, tried at many states: units and drift scales are chosen from what they can do.
 
 Torques given as expressions, or from Python, are evaluated over the run's time span, at the initial state
 and at others like it: turned by the rotations of a tetrahedron, with rates, position and velocity reversed.
@@ -12,13 +12,14 @@ states are followed over the run by their mean slopes, so that the lasting impul
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from itertools import pairwise, product
+from collections.abc import Callable, Iterable, Sequence
+from itertools import chain, pairwise, product
+from typing import Any
 
 import heyoka as hy
 import numpy as np
 
+from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.carriers import Carrier
 from rigidsim.model.formulations.formulation import ModelPlan, Requirements
 from rigidsim.model.formulations.quaternion import quaternion_states
@@ -28,16 +29,16 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.names import written
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Drive, choose_scaling, scaled_numbers
-from rigidsim.model.state_blocks import BODY, StateBlock
+from rigidsim.model.state_blocks import BODY, joined
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, transpose
-from rigidsim.scene.expressions.tree import names_used
+from rigidsim.scene.expressions.tree import names_used, readables
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import surfaces_of
 
 _TIMES = 2048  # over the run
-_LARGEST = 1e100  # largest torque or force in SI that is considered
+_LARGEST = 1e100  # largest torque or force in internal units that is considered
 _TETRAHEDRAL = np.concatenate([np.eye(4), [[0.5, *signs] for signs in product((-0.5, 0.5), repeat=3)]])
 """Rotations of a tetrahedron: over them, functions of first and second order of the attitude average out."""
 _OBLIQUE = np.array([[0.8, 0.4, -0.2, 0.4], [0.5, -0.1, 0.7, -0.5], [0.3, 0.9, 0.1, 0.3]])
@@ -57,73 +58,42 @@ _CELLS = 64  # of the run, in which carriers' momenta are followed
 _HALVINGS = 8
 _NEWTON = 40  # iterations, each of which halves the distance to a double zero
 _CLOCK = "t_of_drive"
+_OPPOSITE = 16  # states at which q and -q are compared
+_ROUNDING = 1e-9  # of the largest component: far above rounding, far below any load that means its sign
+
+Function = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Of times (n,) and states (names, n) to values (expressions, n), internal units."""
 
 
 def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requirements) -> Drive | None:
-    """Estimate of what these loads, whose size is unknown, can add to the motion; None without any."""
+    """Estimate of what these loads, whose size is unknown, can add to the motion; None without any.
+
+    Raises:
+        ConfigError: a load that differs between q and -q, which are one attitude: it would depend on the
+            formulation, on whether its attitude has a sign at all, and on how that was continued.
+    """
     if not loads:
         return None
-    m = probe(scene, requirements, loads)
-    torque = [term for load in loads for term in torque_terms(load, m)]
-    carriers = [load for load in loads if isinstance(load, Carrier)]
-    inner = [term for carrier in carriers for term in carrier.exerted_torque(m)]
-    force = [term for load in loads for term in force_terms(load, m)] if m.velocity is not None else []
-    names, start = start_of(m, loads)
-    narrow = [u for load in loads for u in load.narrow(m)]
-    in_time = (s.expression for s in surfaces_of(scene).found if names_used(s.expression) == {"t"})
-    narrow += written(m, in_time)
-    samples = _Samples(m, names, start, narrow)
-    context, scaling = scene.context, m.scaling
-    inverse = np.array([[float(x) for x in row] for row in m.numbers.inverse_inertia])
-    lasting_only = samples.evaluate(torque)
-    turned = samples.evaluate([*torque, *inner]) if inner else lasting_only
-    pushed = samples.evaluate(force)
-    rates = samples.of(m.rates)
-    power = (turned.values * rates).sum(axis=0)
-    if m.velocity is not None:
-        power = power + (pushed.values * samples.of(m.velocity)).sum(axis=0)
-    if np.any(power != 0) and power.max() <= 0:  # damping only removes energy
-        return Drive(context.zero, context.zero)
-    heaviest = float(np.linalg.norm(inverse, 2))
-    by_space = np.einsum("aij,jta->ita", samples.matrices, lasting_only.values)
-    lasting = 0.0
-    for values, frame in ((lasting_only.values, np.eye(3)), (by_space, samples.matrices[0].T)):
-        impulse = frame @ samples.impulse(values)
-        lasting = max(lasting, float(np.einsum("it,ij,jt->t", impulse, inverse, impulse).max()) / 2)
-    peak = turned.peak(without_mean=lasting > 0 or bool(inner))
-    blocks = [block for x in carriers if (block := x.extra_states(m)) is not None]
-    if blocks:
-        taken = samples.taken_up(blocks, [term for x in carriers for term in x.carried_momentum(m)])
-        lasting += float(np.einsum("ti,ij,tj->t", taken, inverse, taken).max()) / 2
-    swing = min(_TURN * peak, heaviest * min(turned.most, _CYCLE * peak * turned.period) ** 2 / 2)
-    energy = lasting + swing
-    speed = 0.0
-    if force:
-        speed = float(np.linalg.norm(samples.impulse(pushed.values), axis=0).max())
-        peak = pushed.peak(without_mean=speed > 0)
-        room = 2.0 ** (scaling.length - scaling.speed - scaling.time)
-        speed += min(pushed.most, _CYCLE * peak * pushed.period, float(np.sqrt(2 * peak * room)))
-    sizes = ((energy, scaling.energy), (speed, scaling.speed))
-    return Drive(*(context.ldexp(context.mpf(value), exponent) for value, exponent in sizes))
+    trial = _Trial(scene, requirements, loads)
+    if requirements.attitude:
+        trial.refuse_odd()
+    return trial.drive()
 
 
 def effect_at_start(plan: ModelPlan, loads: Sequence[Load]) -> list[tuple[str, float, str]]:
     """Torque and force of loads together at the start: what it is, its size and its unit."""
-    scene, m = plan.scene, probe(plan.scene, plan.requirements, plan.loads)
-    names, start = start_of(m, plan.loads)
-    unit, sizes = m.scaling, []
-    given = [("torque", torque_terms, 2.0**unit.energy, "N m")]
-    if m.velocity is not None:
-        given.append(
-            ("force", force_terms, 2.0 ** (unit.speed - unit.time) * float(m.carried(scene.body.mass)), "N")
-        )
-    for what, terms_of, size, symbol in given:
-        if terms := [term for load in loads for term in terms_of(load, m)]:
-            parts = [hy.sum([float(vector[i]) * x for vector, x in terms]) for i in range(3)]
-            function = hy.cfunc(parts, list(hy.make_vars(*names)), compact_mode=True)
-            values = function(start, time=float(scene.context.ldexp(scene.start, -unit.time)))
-            sizes.append((what, float(np.linalg.norm(values)) * size, symbol))
-    return sizes
+    trial = _Trial(plan.scene, plan.requirements, plan.loads, loads)
+    unit, mass, context = trial.m.scaling, plan.scene.body.mass, plan.scene.context
+    begin = np.array([float(context.ldexp(plan.scene.start, -unit.time))])
+    values = trial.whole(begin, trial.start[:, None])
+    given = [("torque", trial.torques, values[:3], 2.0**unit.energy, "N m")]
+    if trial.m.velocity is not None:
+        given.append(("force", trial.forces, values[6:9], float(mass) * 2.0 ** (unit.speed - unit.time), "N"))
+    return [
+        (what, float(np.linalg.norm(x)) * size, symbol)
+        for what, terms, x, size, symbol in given
+        if any(terms)
+    ]
 
 
 def probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> Mechanics:
@@ -177,145 +147,239 @@ def start_of(m: Mechanics, loads: Sequence[Load]) -> tuple[list[str], np.ndarray
     return list(values), np.array([float(x) for x in values.values()])
 
 
-@dataclass(frozen=True)
-class _Sampled:
-    """A vector sampled over times and states."""
+class _Trial:
+    """Loads in double precision, all that is asked of them in one function: to compile it takes longer than
+    to evaluate it.
 
-    values: np.ndarray  # shape (3, times, states)
-    most: float  # impulse that it would give if it always pointed the same way
-    period: float  # inverse rate of its explicit change in time; infinite if it has none
+    Attributes:
+        names, start: of all states that the loads may read.
+        torques, forces: terms of each load.
+        whole: total torque, torque exerted by carriers, force, and of each what of its rate of change is
+            explicit in time, (18, n).
+    """
 
-    def peak(self, *, without_mean: bool) -> float:
-        """Largest norm; with ``without_mean``, of the vector less its mean over the states."""
-        values = self.values - self.values.mean(axis=2, keepdims=True) if without_mean else self.values
-        return float(np.linalg.norm(values, axis=0).max(initial=0.0))
+    def __init__(
+        self, scene: Scene, requirements: Requirements, loads: Sequence[Load], among: Sequence[Load] = ()
+    ) -> None:
+        m = self.m = probe(scene, requirements, loads)
+        self._tried = among or loads
+        carriers = [x for x in loads_of(scene) if isinstance(x, Carrier)]  # whose states any load may read
+        self.names, self.start = start_of(m, [*loads, *(x for x in carriers if x not in loads)])
+        self._carriers: list[Any] = [load for load in self._tried if isinstance(load, Carrier)]
+        self.torques = [torque_terms(load, m) for load in self._tried]
+        flies = m.velocity is not None
+        self.forces = [force_terms(load, m) if flies else [] for load in self._tried]
+        exerted = [load.exerted_torque(m) if isinstance(load, Carrier) else [] for load in self._tried]
+        kinds, self._exerts = (self.torques, exerted, self.forces), any(exerted)
+        sums = [x for terms in kinds for x in _sums(chain(*terms))]
+        self._parts = [x for terms in zip(*kinds, strict=True) for x in _sums(chain(*terms))]
+        in_time = (s.expression for s in surfaces_of(scene).found if names_used(s.expression) == {"t"})
+        narrow = [u for load in self._tried for u in load.narrow(m)] + written(m, in_time)
+        zeros = [y for u in narrow for y in (u, _by_time(u))]
+        self._all = self._compiled([*sums, *map(_by_time, sums), *zeros, *self._parts])
+        self._narrow = range(18, 18 + len(zeros), 2)
+        begin, end = sorted(float(scene.context.ldexp(x, -m.scaling.time)) for x in (scene.start, scene.end))
+        self._begin, self._span = begin, end - begin
 
+    def whole(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
+        return self._all(times, states)[:18]
 
-class _Samples:
-    """Times and states at which expressions are evaluated."""
-
-    def __init__(self, m: Mechanics, names: list[str], start: np.ndarray, narrow: list[Symbolic]) -> None:
-        self._names = names
-        generator = np.random.default_rng(0)  # the same each time: the units are a function of the scene
-        states = np.repeat(start[:, None], _STATES, axis=1)
-        index = {name: i for i, name in enumerate(names)}
-        for name in (*BODY.rates, *BODY.position, *BODY.velocity):
-            if name in index:
-                states[index[name], _STATES // 2 :] *= -1
-        first = [index[name] for name in BODY.quaternion]
-        turns = [_product(start[first], _product(g, h)) for g in _TETRAHEDRAL for h in _OBLIQUE]
-        states[first] = np.tile(np.array([start[first], *turns]).T, (1, 2))
-        self._states = states
-        self.matrices = np.array([_matrix(q) for q in states[first].T])
-        unit = float(m.scene.context.ldexp(m.scene.context.one, m.scaling.time))
-        begin, end = sorted(float(time) / unit for time in (m.scene.start, m.scene.end))
-        cells = np.linspace(begin, end, _TIMES + 1)
-        uniform = cells[:-1] + generator.uniform(0, 1, _TIMES) * np.diff(cells)
-        self._span = end - begin
-        self._times = np.unique(np.concatenate([[begin, end], uniform, *self._pulses(narrow, uniform)]))
-        self._times = self._times[(self._times >= begin) & (self._times <= end)]
-        self._uniform = np.searchsorted(self._times, uniform)
-
-    def _compiled(self, expressions: Sequence[Symbolic]) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-        """Function of times (t,) and states (names, s) to values (expressions, t, s), 0 if they aren't
-        finite.
-        """
-        function = hy.cfunc(list(expressions), list(hy.make_vars(*self._names)), compact_mode=True)
+    def _compiled(self, expressions: Sequence[Symbolic]) -> Function:
+        """Values that aren't finite are 0."""
+        variables = list(hy.make_vars(*self.names))
+        function = hy.cfunc(list(map(hy.expression, expressions)), variables, compact_mode=True)
 
         def evaluated(times: np.ndarray, states: np.ndarray) -> np.ndarray:
-            inputs = np.ascontiguousarray(np.tile(states, (1, len(times))))
             with np.errstate(all="ignore"):
-                found = function(inputs, time=np.repeat(times, states.shape[1]))
-            found = np.asarray(found).reshape(len(expressions), len(times), states.shape[1])
+                found = np.asarray(function(np.ascontiguousarray(states), time=times))
             # values that no run survives tell nothing about its scale
             return np.where(np.abs(found) < _LARGEST, found, 0.0)
 
         return evaluated
 
-    def of(self, expressions: Sequence[Symbolic]) -> np.ndarray:
-        """Values of expressions over all times and states."""
-        return self._compiled(expressions)(self._times, self._states)
+    # --- the quaternion's sign ------------------------------------------------------------------------------
 
-    def evaluate(self, terms: Sequence[Term]) -> _Sampled:
-        """Samples of the sum of terms."""
-        if not terms:
-            return _Sampled(np.zeros((3, len(self._times), _STATES)), 0.0, np.inf)
-        sums = [hy.sum([float(vector[i]) * x for vector, x in terms]) for i in range(3)]
-        values = self.of([*sums, *(_by_time(x) for x in sums)])
-        changes, values = values[3:], values[:3]
-        size = np.linalg.norm(values, axis=0)
-        fastest = float(np.linalg.norm(changes, axis=0).max())
-        most = float(np.trapezoid(size.max(axis=1), self._times))
-        return _Sampled(values, most, float(size.max()) / fastest if fastest > 0 else np.inf)
+    def refuse_odd(self) -> None:
+        """Refuse a load, given by expressions or from Python, that differs between q and -q."""
+        generator = np.random.default_rng(0)  # the same each time
+        states = self.start[:, None] + generator.uniform(-1, 1, (len(self.names), _OPPOSITE))
+        rows = [self.names.index(name) for name in BODY.quaternion]
+        states[rows] /= np.linalg.norm(states[rows], axis=0)
+        other = states.copy()
+        other[rows] *= -1
+        times = self._begin + self._span * generator.uniform(0, 1, _OPPOSITE)
+        here, there = (self._all(times, x)[-len(self._parts) :] for x in (states, other))
+        for load, one, opposite in zip(
+            self._tried, here.reshape(-1, 3, _OPPOSITE), there.reshape(-1, 3, _OPPOSITE), strict=True
+        ):
+            different = np.abs(one - opposite) > _ROUNDING * np.abs([one, opposite]).max(axis=(0, 1))
+            if different.any():
+                part, place = np.argwhere(different)[0]
+                raise ConfigError(
+                    _oddness(load, states[rows, place], one[part, place], opposite[part, place])
+                )
 
-    def taken_up(self, blocks: Sequence[StateBlock], momentum: Sequence[Term]) -> np.ndarray:
-        """What carriers' momenta, as terms, have taken up by the ends of cells of the run, (cells, 3), if
-        each of their states follows the mean of its slope over the others; zero where that is only noise.
+    # --- what the loads can add -----------------------------------------------------------------------------
+
+    def drive(self) -> Drive:
+        """Estimated energy of rotation and speed that the loads add."""
+        m, names, states = self.m, self.names, self._states()
+        context, scaling = m.scene.context, m.scaling
+        times = self._moments(states)
+        sampled = self.over(self.whole, times, states)
+        torque, inner, pushed, torque_change, inner_change, pushed_change = sampled.reshape(
+            6, 3, *sampled.shape[1:]
+        )
+        turned = torque + inner
+        rates = (
+            states[[names.index(x) for x in BODY.rates], None]
+            * np.array(m.numbers.rate_units, dtype=float)[:, None, None]
+        )
+        power = (turned * rates).sum(axis=0)
+        if m.velocity is not None:
+            power = power + (pushed * states[[names.index(x) for x in BODY.velocity], None]).sum(axis=0)
+        if np.any(power != 0) and power.max() <= 0:  # damping only removes energy
+            return Drive(context.zero, context.zero)
+        inverse = np.array([[float(x) for x in row] for row in m.numbers.inverse_inertia])
+        matrices = np.array([_matrix(q) for q in states[[names.index(x) for x in BODY.quaternion]].T])
+        lasting = 0.0
+        for values, frame in (
+            (torque, np.eye(3)),
+            (np.einsum("aij,jta->ita", matrices, torque), matrices[0].T),
+        ):
+            impulse = frame @ self._impulse(times, values)
+            lasting = max(lasting, float(np.einsum("it,ij,jt->t", impulse, inverse, impulse).max()) / 2)
+        peak = _peak(turned, without_mean=lasting > 0 or self._exerts)
+        taken = self._taken_up(times, states)
+        lasting += float(np.einsum("ti,ij,tj->t", taken, inverse, taken).max()) / 2
+        swing = _swing(times, turned, torque_change + inner_change, peak)
+        energy = lasting + min(_TURN * peak, float(np.linalg.norm(inverse, 2)) * swing**2 / 2)
+        speed = float(np.linalg.norm(self._impulse(times, pushed), axis=0).max())
+        peak = _peak(pushed, without_mean=speed > 0)
+        room = 2.0 ** (scaling.length - scaling.speed - scaling.time)
+        speed += min(_swing(times, pushed, pushed_change, peak), float(np.sqrt(2 * peak * room)))
+        sizes = ((energy, scaling.energy), (speed, scaling.speed))
+        return Drive(*(context.ldexp(context.mpf(value), exponent) for value, exponent in sizes))
+
+    def _states(self) -> np.ndarray:
+        """States like the start, (names, states)."""
+        states = np.repeat(self.start[:, None], _STATES, axis=1)
+        for name in (*BODY.rates, *BODY.position, *BODY.velocity):
+            if name in self.names:
+                states[self.names.index(name), _STATES // 2 :] *= -1
+        first = [self.names.index(name) for name in BODY.quaternion]
+        turns = [_product(self.start[first], _product(g, h)) for g in _TETRAHEDRAL for h in _OBLIQUE]
+        states[first] = np.tile(np.array([self.start[first], *turns]).T, (1, 2))
+        return states
+
+    def _moments(self, states: np.ndarray) -> np.ndarray:
+        """Times over the run, and on a logarithmic grid around the zeros of arguments, which Newton's method
+        finds.
         """
-        rows = [self._names.index(name) for block in blocks for name in block.names]
-        slopes = self._compiled([x for block in blocks for x in block.derivatives])
-        carried = self._compiled([hy.expression(x) for _, x in momentum])
-        vectors = np.array([[float(x) for x in vector] for vector, _ in momentum])
-        edges = np.linspace(0, len(self._times) - 1, _CELLS + 1).astype(int)
-        start = self._states[rows, :1]
+        cells, generator = np.linspace(0, 1, _TIMES + 1), np.random.default_rng(0)  # the same each time
+        self._uniform = self._begin + self._span * (cells[:-1] + generator.uniform(0, 1, _TIMES) / _TIMES)
+        found = [self._uniform, self._begin + self._span * np.array([0.0, 1.0])]
+        for row in self._narrow:
+            at = self._uniform
+            for _ in range(_NEWTON):
+                value, slope = self.over(self._all, at, states[:, :1])[row : row + 2, :, 0]
+                moves = slope != 0
+                step = np.where(moves, value / np.where(moves, slope, 1), 0)
+                at = at - np.clip(step, -self._span, self._span)
+            zeros = np.sort(at[np.abs(self.over(self._all, at, states[:, :1])[row, :, 0]) < 1])
+            zeros = zeros[np.diff(zeros, prepend=-np.inf) > 1e-9 * self._span][:_MOST_PULSES]
+            found += [zero + sign * self._span * _AROUND for zero in zeros for sign in (-1, 1)]
+        times = np.unique(np.concatenate(found))
+        return times[(times >= self._begin) & (times <= self._begin + self._span)]
 
-        def holding(values: np.ndarray) -> np.ndarray:
-            states = self._states.copy()
+    @staticmethod
+    def over(function: Function, times: np.ndarray, states: np.ndarray) -> np.ndarray:
+        """Values over all times and states, (expressions, times, states)."""
+        count = states.shape[1]
+        values = function(np.repeat(times, count), np.tile(states, (1, len(times))))
+        return values.reshape(len(values), len(times), count)
+
+    def _impulse(self, times: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Running integral of a vector's mean over the states, shape (3, times); zero if it is only noise."""
+        means, size = values.mean(axis=2), np.sqrt((values**2).sum(axis=0).mean(axis=1))
+        sums = np.cumsum((means[:, 1:] + means[:, :-1]) / 2 * np.diff(times), axis=1)
+        total = np.concatenate([np.zeros((3, 1)), sums], axis=1)
+        spread = means[:, np.searchsorted(times, self._uniform)].std(axis=1)
+        noise = _NOISE * self._span * float(np.linalg.norm(spread)) / np.sqrt(_TIMES)
+        noise = max(noise, _LASTING * float(np.trapezoid(size, times)))
+        return total if np.linalg.norm(total, axis=0).max() > noise else np.zeros_like(total)
+
+    def _taken_up(self, moments: np.ndarray, given: np.ndarray) -> np.ndarray:
+        """What carriers' momenta have taken up by the ends of cells of the run, (cells, 3), if each of their
+        states follows the mean of its slope over the others; zero where that is only noise.
+        """
+        blocks = [block for x in self._carriers if (block := x.extra_states(self.m)) is not None]
+        if not blocks:
+            return np.zeros((1, 3))
+        block, momentum = joined(blocks), _sums(x for y in self._carriers for x in y.carried_momentum(self.m))
+        rows = [self.names.index(name) for name in block.names]
+        function = self._compiled([*block.derivatives, *momentum])
+        edges, start = np.linspace(0, len(moments) - 1, _CELLS + 1).astype(int), given[rows, :1]
+
+        def at(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+            states = given.copy()
             states[rows] = values
-            return states
+            return self.over(function, times, states)
 
         def changes(times: np.ndarray, values: np.ndarray) -> list[np.ndarray]:
             """By the mean slopes with the states at these values, and by their root mean squares."""
-            given = slopes(times, holding(values))
-            sizes = given.mean(axis=2), np.sqrt((given**2).mean(axis=2))
+            slopes = at(times, values)[: len(rows)]
+            sizes = slopes.mean(axis=2), np.sqrt((slopes**2).mean(axis=2))
             return [np.trapezoid(x, times, axis=1)[:, None] for x in sizes]
 
-        now, tossed, found = start.copy(), np.zeros_like(start), []
-        before = carried(self._times[:1], holding(start)).mean(axis=(1, 2))
+        now, rms_change, found = start.copy(), np.zeros_like(start), []
+        before = at(moments[:1], start)[len(rows) :].mean(axis=(1, 2))
         for first, last in pairwise(edges):
-            times = self._times[first : last + 1]
+            times = moments[first : last + 1]
             change, _ = changes(times, now)
             share = np.ones_like(change)
             # a slope that falls as the state grows ends where the change is that of the slope there
             if np.any((changes(times, now + change)[0] - change) * change < 0):
-                low = np.zeros_like(share)
-                high = share.copy()
+                low, high = np.zeros_like(share), share.copy()
                 for _ in range(_HALVINGS):
                     share = (low + high) / 2
                     short = (changes(times, now + share * change)[0] - share * change) * change > 0
                     low, high = np.where(short, share, low), np.where(short, high, share)
             now = now + share * change
-            tossed = tossed + changes(times, now)[1]
-            known = np.where(np.abs(now - start) > _LASTING * tossed, now, start)
-            after = carried(self._times[last : last + 1], holding(known)).mean(axis=(1, 2))
-            found.append((after - before) @ vectors)
+            rms_change = rms_change + changes(times, now)[1]
+            known = np.where(np.abs(now - start) > _LASTING * rms_change, now, start)
+            found.append(at(moments[last : last + 1], known)[len(rows) :].mean(axis=(1, 2)) - before)
         return np.array(found)
 
-    def impulse(self, values: np.ndarray) -> np.ndarray:
-        """Running integral of a vector's mean over the states, shape (3, times); zero if it is only noise."""
-        means, size = values.mean(axis=2), np.sqrt((values**2).sum(axis=0).mean(axis=1))
-        steps = np.diff(self._times)
-        sums = np.cumsum((means[:, 1:] + means[:, :-1]) / 2 * steps, axis=1)
-        total = np.concatenate([np.zeros((3, 1)), sums], axis=1)
-        spread = means[:, self._uniform].std(axis=1)
-        noise = _NOISE * self._span * float(np.linalg.norm(spread)) / np.sqrt(_TIMES)
-        noise = max(noise, _LASTING * float(np.trapezoid(size, self._times)))
-        return total if np.linalg.norm(total, axis=0).max() > noise else np.zeros_like(total)
 
-    def _pulses(self, narrow: list[Symbolic], times: np.ndarray) -> list[np.ndarray]:
-        """Times on a logarithmic grid around the zeros of arguments, which Newton's method finds."""
-        found = []
-        for u in narrow:
-            argument, at = self._compiled([u, _by_time(u)]), times
-            for _ in range(_NEWTON):
-                value, slope = argument(at, self._states[:, :1])[:, :, 0]
-                moves = slope != 0
-                step = np.where(moves, value / np.where(moves, slope, 1), 0)
-                at = at - np.clip(step, -self._span, self._span)
-            zeros = np.sort(at[np.abs(argument(at, self._states[:, :1])[0, :, 0]) < 1])
-            zeros = zeros[np.diff(zeros, prepend=-np.inf) > 1e-9 * self._span][:_MOST_PULSES]
-            found += [zero + sign * self._span * _AROUND for zero in zeros for sign in (-1, 1)]
-        return found
+def _oddness(load: Load, quaternion: np.ndarray, here: float, there: float) -> Problem:
+    odd = (x.where for x in load.formulas() if any(readable.changes_sign for readable in readables(x)))
+    shown = ", ".join(f"{x:.3g}" for x in quaternion)
+    return Problem(
+        next(odd, "loads"),
+        f"{load.title} depends on the sign of the quaternion: at q = [{shown}] a part of it is "
+        f"{here:.3g} (in internal units), at -q, which is the same attitude, {there:.3g}; use products such "
+        "as qw*qx, or say where it jumps: sign(qw)*qx",
+    )
+
+
+def _sums(terms: Iterable[Term]) -> list[Symbolic]:
+    """Components of a sum of terms."""
+    given = list(terms)
+    return [hy.sum([float(vector[i]) * hy.expression(x) for vector, x in given]) for i in range(3)]
+
+
+def _peak(values: np.ndarray, *, without_mean: bool) -> float:
+    """Largest norm of a vector; with ``without_mean``, of it less its mean over the states."""
+    values = values - values.mean(axis=2, keepdims=True) if without_mean else values
+    return float(np.linalg.norm(values, axis=0).max(initial=0.0))
+
+
+def _swing(times: np.ndarray, values: np.ndarray, changes: np.ndarray, peak: float) -> float:
+    """Impulse of a vector that turns round as its explicit change in time makes it, or of the whole run."""
+    size, fastest = np.linalg.norm(values, axis=0), float(np.linalg.norm(changes, axis=0).max())
+    most = float(np.trapezoid(size.max(axis=1), times))
+    return min(most, _CYCLE * peak * float(size.max()) / fastest) if fastest > 0 else most
 
 
 def _by_time(u: Symbolic) -> Symbolic:

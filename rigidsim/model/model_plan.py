@@ -9,12 +9,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import heyoka as hy
-import numpy as np
-
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.averaged.average import Average
-from rigidsim.model.carriers import Carrier
 from rigidsim.model.formulations.averaged import Averaged
 from rigidsim.model.formulations.formulation import (
     REGISTERED,
@@ -27,8 +23,8 @@ from rigidsim.model.formulations.planar import Planar
 from rigidsim.model.formulations.quaternion import Quaternion
 from rigidsim.model.formulations.rates import Rates
 from rigidsim.model.frames import refuse_without_plane
-from rigidsim.model.load import Load, force_terms, loads_of, torque_terms
-from rigidsim.model.load_estimate import estimate_drive, orbit_tags, probe, start_of
+from rigidsim.model.load import Load, loads_of
+from rigidsim.model.load_estimate import estimate_drive, orbit_tags
 from rigidsim.model.loads.attraction import Attraction
 from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.observables.observable import NEEDS
@@ -36,7 +32,6 @@ from rigidsim.model.orbits.prescribed import places_of
 from rigidsim.model.own_states import own_units, refuse_odd_states
 from rigidsim.model.placements.kernel_body import refuse_same_sources
 from rigidsim.model.scaling import Scaling, choose_scaling, scaled_numbers
-from rigidsim.model.state_blocks import BODY
 from rigidsim.scene.choices import AUTO, variables_named
 from rigidsim.scene.expressions.tree import readables, states_read
 from rigidsim.scene.registry import OBSERVABLES
@@ -45,8 +40,6 @@ from rigidsim.scene.surfaces import surfaces_of
 from rigidsim.scene.transitions import happens_at_a_moment
 
 _SAME_BODY = 1e-3  # relative difference of gravitational parameters below which two sources are taken as one
-_STATES = 16
-_NOISE = 1e-9  # of the largest component: far above rounding, far below any load that means its sign
 
 
 def plan_model(
@@ -81,7 +74,6 @@ def plan_model(
     elif scaling is None:
         unknown = [x for x in loads if formulation.resolves_rotation and x.amplitude(scene) is None]
         refuse_odd_states(scene)
-        refuse_odd_loads(scene, requirements, unknown)
         scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements))
     if scene.states and not scaling.own:
         known = None if like is None else like.scaling.own
@@ -245,42 +237,6 @@ def _check_recordable(scene: Scene, formulation: str, record: list[str] | None) 
 # --- loads that are refused ---------------------------------------------------------------------------------
 
 
-def refuse_odd_loads(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> None:
-    """Refuse a load, given by expressions or from Python, that differs between q and -q at random states.
-
-    Both are one attitude: an odd load would depend on the formulation, on whether its attitude has a sign at
-    all, and on how that was continued.
-    """
-    carriers = [x for x in loads_of(scene) if isinstance(x, Carrier)]  # whose states any load may read
-    for load in loads:
-        if "attitude" not in load.reads or not requirements.attitude:
-            continue
-        others = [x for x in carriers if x is not load]
-        m = probe(scene, requirements, [load])
-        terms = [*torque_terms(load, m), *(force_terms(load, m) if m.velocity is not None else [])]
-        terms += load.exerted_torque(m) if isinstance(load, Carrier) else []
-        if not terms:
-            continue
-        names, start = start_of(m, [load, *others])
-        generator = np.random.default_rng(0)  # the same each time
-        states = start[:, None] + generator.uniform(-1, 1, (len(names), _STATES))
-        rows = [names.index(name) for name in BODY.quaternion]
-        states[rows] /= np.linalg.norm(states[rows], axis=0)
-        other = states.copy()
-        other[rows] *= -1
-        unit = float(scene.context.ldexp(scene.context.one, m.scaling.time))
-        begin, end = sorted(float(time) / unit for time in (scene.start, scene.end))
-        times = generator.uniform(begin, end, _STATES)
-        function = hy.cfunc([x for _, x in terms], list(hy.make_vars(*names)), compact_mode=True)
-        with np.errstate(all="ignore"):
-            here, there = (np.asarray(function(np.ascontiguousarray(s), time=times)) for s in (states, other))
-            different = np.abs(here - there) > _NOISE * np.maximum(np.abs(here), np.abs(there)).max(axis=0)
-        different &= np.isfinite(here) & np.isfinite(there)
-        if different.any():
-            term, place = np.argwhere(different)[0]
-            raise ConfigError(_oddness(load, states[rows, place], here[term, place], there[term, place]))
-
-
 def refuse_second_orbits(scene: Scene, loads: Sequence[Load]) -> None:
     """Refuse the gradient of a source whose place is integrated already: it would act twice."""
     where, bodies = "[[loads]] gravity_gradient", scene.bodies
@@ -309,14 +265,3 @@ def refuse_second_orbits(scene: Scene, loads: Sequence[Load]) -> None:
                 what = "given with the gravitational parameter of one of [[bodies]] and another orbit; "
                 what += 'give orbit = {body = "..."}, which is where that body is'
                 raise ConfigError(Problem(where, what))
-
-
-def _oddness(load: Load, quaternion: np.ndarray, here: float, there: float) -> Problem:
-    odd = (x.where for x in load.formulas() if any(readable.changes_sign for readable in readables(x)))
-    shown = ", ".join(f"{x:.3g}" for x in quaternion)
-    return Problem(
-        next(odd, "loads"),
-        f"{load.title} depends on the sign of the quaternion: at q = [{shown}] a part of it is "
-        f"{here:.3g} (in internal units), at -q, which is the same attitude, {there:.3g}; use products such "
-        "as qw*qx, or say where it jumps: sign(qw)*qx",
-    )
