@@ -79,7 +79,7 @@ def _written(node: ast.AST, known: Mapping[str, _Text]) -> _Text:
     if isinstance(node, ast.Name):
         return known.get(node.id, _Text(node.id, _LEAF))
     if isinstance(node, ast.Constant):
-        number = Decimal(node.value)
+        number = Decimal(str(node.value))
         digits = f"{number:{'f' if not number or -5 <= number.adjusted() < 15 else 'e'}}"
         return _Text(re.sub(r"\.?0+(?=e|$)", "", digits) if "." in digits else digits, _LEAF)
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):

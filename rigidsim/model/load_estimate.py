@@ -88,7 +88,15 @@ def effect_at_start(plan: ModelPlan, loads: Sequence[Load]) -> list[tuple[str, f
     values = trial.whole(begin, trial.start[:, None])
     given = [("torque", trial.torques, values[:3], 2.0**unit.energy, "N m")]
     if trial.m.velocity is not None:
-        given.append(("force", trial.forces, values[6:9], float(mass) * 2.0 ** (unit.speed - unit.time), "N"))
+        given.append(
+            (
+                "force",
+                trial.forces,
+                values[6:9],
+                float(trial.m.carried(mass)) * 2.0 ** (unit.speed - unit.time),
+                "N",
+            )
+        )
     return [
         (what, float(np.linalg.norm(x)) * size, symbol)
         for what, terms, x, size, symbol in given
