@@ -17,8 +17,8 @@ from rigidsim.store.run import Run, SavedRun, open_run
 from rigidsim.store.sweeps.folder import is_sweep
 from rigidsim.store.sweeps.run import open_sweep
 from rigidsim.workflows.compare.as_run import open_any
-from rigidsim.workflows.fit.folder import FitFolder
-from rigidsim.workflows.fit.seen import fitted_run
+from rigidsim.workflows.fit.fitting import FitFolder
+from rigidsim.workflows.fit.result import fitted_run
 from rigidsim.workflows.read import load, parse
 from rigidsim.workflows.run import run
 from rigidsim.workflows.sweeps.members import single_member
@@ -42,7 +42,7 @@ def runs_of(paths: Sequence[Path], members: Sequence[int] = ()) -> list[tuple[st
 
 
 def _fit(path: Path) -> Run:
-    folder = FitFolder(path if path.is_dir() else path.parent)
+    folder = FitFolder.of(path)
     return fitted_run(load(folder.fitted), folder.read_dataset(), str(folder.path))
 
 

@@ -12,8 +12,8 @@ import xarray
 import rigidsim
 from rigidsim.errors import ConfigError, RigidsimError, RunFolderError
 from rigidsim.workflows.fit import fitting
+from rigidsim.workflows.fit.estimation import inverse_right_jacobian
 from rigidsim.workflows.fit.predictions import ByDifferences
-from rigidsim.workflows.fit.searching import inverse_right_jacobian
 
 SPIN = 0.7  # rad/s about z
 SIGMA = 0.01  # rad

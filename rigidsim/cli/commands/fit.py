@@ -3,11 +3,11 @@
 import sys
 from pathlib import Path
 
-from rigidsim.cli.screens.fit import print_again, print_fit, print_saved
+from rigidsim.cli.screens.fit import print_fit
 from rigidsim.cli.screens.page import answer
+from rigidsim.cli.screens.summary import print_verdict
 from rigidsim.store.outputs import refuse_loss, writing
 from rigidsim.workflows.fit import fitting
-from rigidsim.workflows.fit.folder import FitFolder
 from rigidsim.workflows.fit.result import FitResult
 from rigidsim.workflows.read import load
 
@@ -39,15 +39,14 @@ def resume(path: Path, as_json: bool) -> int:
 def verify(path: Path, as_json: bool) -> int:
     """Fit again and compare every number."""
     verdict = fitting.verify_fit(path, told=_tell)
-    answer(as_json, verdict.as_dict(), print_again, verdict)
+    answer(as_json, verdict.as_dict(), print_verdict, verdict.as_dict(), "variable")
     return 0 if verdict.identical else 1
 
 
 def info(path: Path, as_json: bool) -> None:
     """Print a fit's summary as it was saved."""
-    folder = FitFolder(path if path.is_dir() else path.parent)
-    saved = folder.read_result()
-    answer(as_json, saved.as_dict(), print_saved, saved)
+    saved = fitting.FitFolder.of(path).read_result()
+    answer(as_json, saved.as_dict(), print_fit, saved)
 
 
 def _print(result: FitResult, as_json: bool) -> int:

@@ -6,7 +6,6 @@ import math
 
 from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.scene.readable import span_text
-from rigidsim.workflows.fit.fitting import FitVerdict
 from rigidsim.workflows.fit.result import FitResult, FittedData, digits_text
 
 _MOST_OUTLIERS = 10
@@ -46,22 +45,6 @@ def print_fit(found: FitResult) -> None:
         on.line("folder", found.folder)
         on.line("next", f"rigidsim view {found.folder}", "cyan")
         on.line("", f"rigidsim run {found.folder}/fitted.toml", "cyan")
-
-
-print_saved = print_fit
-
-
-def print_again(verdict: FitVerdict) -> None:
-    """Print what a second fit showed."""
-    on = Page()
-    if verdict.identical:
-        on.say(("identical", "bold"), f"  {verdict.path}: {verdict.variables} variables, every bit")
-        return
-    on.say(("differs", "bold yellow"), f"  {verdict.path}")
-    for text in (*verdict.problems, *(f"variable {name} differs" for name in verdict.differing)):
-        on.line("", text)
-    for text in verdict.environment:
-        on.line("changed", text)
 
 
 def _tell_correlations(on: Page, found: FitResult) -> None:

@@ -1,30 +1,58 @@
-"""``rigidsim fit``: an experiment's parameters from observations."""
+"""``rigidsim fit``: an experiment's parameters from observations, kept in a folder, made again, viewed."""
 
 from __future__ import annotations
 
+import fcntl
+import hashlib
 import json
-from collections.abc import Callable, Mapping
-from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field
+import platform
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import heyoka
 import numpy as np
+import xarray
 
-from rigidsim.errors import SWEEP, ConfigError, Problem, Remedy, RigidsimError, RunFolderError
+from rigidsim import __version__
+from rigidsim.errors import (
+    FORCE,
+    OUT,
+    RESUME,
+    SWEEP,
+    ConfigError,
+    Problem,
+    Remedy,
+    RigidsimError,
+    RunFolderError,
+)
 from rigidsim.scene.config import Experiment
 from rigidsim.store import atomic
+from rigidsim.store.fits import BEGUN
+from rigidsim.store.folder import FileOf, WorkFolder
 from rigidsim.store.outputs import refuse_inputs
-from rigidsim.workflows.fit.folder import FitFolder, identity
+from rigidsim.workflows.fit.estimation import Weighing, search
 from rigidsim.workflows.fit.keys import FitKeys
-from rigidsim.workflows.fit.observed import observing
+from rigidsim.workflows.fit.observations import (
+    DataFiles,
+    content,
+    digest,
+    files_beside,
+    observing,
+    read_readings,
+)
 from rigidsim.workflows.fit.predictions import ByDifferences, ByTangents, Predictor
-from rigidsim.workflows.fit.readings import DataFiles, files_beside, read_readings
-from rigidsim.workflows.fit.result import FitResult, result_of
-from rigidsim.workflows.fit.searching import Weighing, search
+from rigidsim.workflows.fit.result import KIND, FitResult, result_of
 from rigidsim.workflows.read import Given, as_experiment, load
+from rigidsim.workflows.verify import Verdict
 
 _ALONG_ROWS = 201
+_NAMES = (
+    "config.toml", "dataset.h5", "summary.json", "fitted.toml", "figure.png", "data", "evaluations", BEGUN,
+)  # fmt: skip
+_AGAIN = f"copy it again from where it is whole, or make the fit again ({FORCE})"
 
 Told = Callable[[str], None]
 
@@ -60,11 +88,11 @@ def fit(
     places = files_beside(asked)
     if out is None:
         return fit_to(asked, places, told=told)
-    folder = FitFolder(Path(out) / asked.config.name)
-    missing = [path for files in places for path in files.all if not path.exists()]
+    folder, data = FitFolder(Path(out) / asked.config.name), [path for files in places for path in files]
+    missing = [path for path in data if not path.exists()]
     if missing:
         raise RigidsimError(f"{missing[0]}: there is no such file; [[fit.data]] files lie next to the config")
-    refuse_inputs([folder.path], [*asked.files, *(path for files in places for path in files.all)])
+    refuse_inputs([folder.path], [*asked.files, *data])
     with folder.locked():
         folder.begin(asked, places, force=force)
         return _kept(asked, folder, told)
@@ -85,57 +113,36 @@ def resume_fit(path: str | Path, *, told: Told | None = None) -> FitResult:
         return _kept(load(folder.config), folder, told)
 
 
-@dataclass(frozen=True)
-class FitVerdict:
-    """Result of a verification; ``environment``: versions that changed since, which may explain the rest."""
-
-    path: str
-    identical: bool
-    problems: list[str] = field(default_factory=list)
-    differing: list[str] = field(default_factory=list)
-    environment: list[str] = field(default_factory=list)
-    variables: int = 0
-
-    def as_dict(self) -> dict[str, Any]:
-        """Values for JSON."""
-        return asdict(self)
-
-
-def verify_fit(path: str | Path, *, told: Told | None = None) -> FitVerdict:
-    """Make a finished fit again and compare every number of its dataset, and its fitted config.
+def verify_fit(path: str | Path, *, told: Told | None = None) -> Verdict:
+    """Make a finished fit again and compare every number of its dataset, and its fitted config; the verdict's
+    samples are variables.
 
     Raises:
         RunFolderError: no finished fit is there.
     """
-    given = Path(path)
-    folder = FitFolder(given if given.is_dir() else given.parent)
+    folder = FitFolder.of(path)
     saved, experiment = folder.read_dataset(), load(folder.config)
     copies = folder.copies(experiment)
     begun = json.loads(folder.begun.read_text(encoding="utf-8"))
-    now = identity(experiment, copies)
+    now, versions = identity(experiment, copies), begun.pop("versions")
     problems = [
         f"{key.removesuffix('_sha256')}: not the bytes that the fit was made from"
         for key, known in begun.items()
-        if key != "versions" and known != now.get(key)
+        if known != now.get(key)
     ]
     again = fit_to(experiment, copies, told=told)
     if again.experiment.text != folder.fitted.read_text(encoding="utf-8"):
         problems.append(f"{folder.fitted.name}: other values than those fitted again")
-    names = sorted({*map(str, saved.variables), *map(str, again.dataset.variables)})
-    differing = [
-        name
-        for name in names
-        if name not in saved.variables
-        or name not in again.dataset.variables
-        or not saved[name].variable.equals(again.dataset[name].variable)
-    ]
+    one, other = ({str(name): x for name, x in y.variables.items()} for y in (saved, again.dataset))
+    names = sorted({*one, *other})
+    differing = [n for n in names if n not in one or n not in other or not one[n].equals(other[n])]
     changed = [
         f"{name} {then} -> {now['versions'].get(name)}"
-        for name, then in begun["versions"].items()
+        for name, then in versions.items()
         if now["versions"].get(name) != then
     ]
     identical = not problems and not differing
-    return FitVerdict(str(folder.path), identical, problems, differing, changed, len(names))
+    return Verdict(str(folder.path), identical, problems, None, differing, changed, len(names))
 
 
 def _kept(experiment: Experiment, folder: FitFolder, told: Told | None) -> FitResult:
@@ -178,36 +185,142 @@ def fit_to(experiment: Experiment, places: list[DataFiles], *, told: Told | None
     Raises:
         ConfigError, RigidsimError: as for ``fit``.
     """
-    keys = FitKeys(experiment)
-    assert experiment.config.fit is not None
-    with ExitStack() as stack:
-        try:
-            quantities, quiet = stack.enter_context(observing(experiment))
-            readings = [
-                read_readings(number, *given, keys.scene)
-                for number, given in enumerate(
-                    zip(experiment.config.fit.data, quantities, places, strict=True), start=1
+    keys, table = FitKeys(experiment), experiment.config.fit
+    assert table is not None
+    try:
+        with observing(experiment) as (quantities, quiet):
+            sets = enumerate(zip(table.data, quantities, places, strict=True), start=1)
+            readings = [read_readings(number, *given, keys.scene) for number, given in sets]
+            numbers = sum(one.sigmas.size for one in readings)
+            if numbers + sum(one.sigma is not None for one in keys.estimated) < len(keys.estimated):
+                raise RigidsimError(
+                    f"fit: {numbers} numbers are observed, fewer than the {len(keys.estimated)} that are "
+                    "estimated; add data or priors, or estimate fewer"
                 )
-            ]
-        except ConfigError as error:
-            raise error.at(experiment.source) from None
-        numbers = sum(one.sigmas.size for one in readings)
-        if numbers + sum(one.sigma is not None for one in keys.estimated) < len(keys.estimated):
-            raise RigidsimError(
-                f"fit: {numbers} numbers are observed, fewer than the {len(keys.estimated)} that are "
-                "estimated; add data or priors, or estimate fewer"
+            predictor: Predictor
+            try:
+                predictor = ByTangents(keys, quiet, quantities)
+            except ConfigError as error:
+                predictor = ByDifferences(keys, quiet, quantities)
+                predictor.how += f" ({error.problems[0].what})"
+            weighing = Weighing(keys, readings, predictor)
+            ended, costs, more = search(weighing, table.starts, told or (lambda _: None))
+            times = np.linspace(float(keys.scene.start), float(keys.scene.samples.last), _ALONG_ROWS)
+            along = weighing.along(ended.values, times)
+    except ConfigError as error:
+        raise error.at(experiment.source) from None
+    notes = [*dict.fromkeys(text for one in readings for text in one.told), *more]
+    return result_of(experiment.config.name, keys, weighing, ended, costs, predictor.how, notes, along, times)
+
+
+# --- the folder of a fit ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class FitFolder(WorkFolder):
+    """Paths of one fit."""
+
+    kind = KIND
+    kept = "its copies of config and data stay"
+    resumed = "makes it"
+    seen_by = fcntl.LOCK_EX
+
+    fitted = FileOf("fitted.toml")
+    """The config with the estimated values."""
+    figure = FileOf("figure.png")
+    """The figure."""
+    data = FileOf("data")
+    """Copies of the data."""
+    begun = FileOf(BEGUN)
+    """What it was begun with."""
+
+    @classmethod
+    def of(cls, path: str | Path) -> FitFolder:
+        """The folder at a path, or of a file in it."""
+        return cls(Path(path) if Path(path).is_dir() else Path(path).parent)
+
+    @property
+    def is_fit(self) -> bool:
+        """Whether the folder holds a fit, finished or not."""
+        return self.begun.is_file()
+
+    @property
+    def finished(self) -> bool:
+        """Whether its results are there."""
+        return self.summary.is_file() and self.is_fit
+
+    def begin(self, experiment: Experiment, sources: Sequence[DataFiles], *, force: bool) -> None:
+        """Copy config and data; what an interrupted fit left is replaced.
+
+        Raises:
+            RunFolderError: a finished fit, or something else, is there.
+        """
+        there = self.content(_NAMES)
+        if self.finished and not force:
+            raise RunFolderError(
+                f"{self.path}: a finished fit is there; {FORCE} replaces it, or choose {OUT}"
             )
-        predictor: Predictor
+        if there and not self.is_fit and not force:
+            raise RunFolderError(
+                f"{self.path}: holds {min(there)}, and no fit; {FORCE} replaces it, or choose {OUT}"
+            )
+        for name in there:
+            path = self.path / name
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+        atomic.write_bytes(self.begun, json.dumps(identity(experiment, sources), indent=2).encode())
+        self.data.mkdir()
+        for files, copies in zip(sources, self.copies(experiment), strict=True):
+            for path, copy in zip(files, copies, strict=True):
+                atomic.write_bytes(copy, content(path))
+        atomic.write_bytes(self.config, experiment.text.encode())
+
+    def read_result(self) -> FitResult:
+        """The result as it was saved, without its dataset.
+
+        Raises:
+            RunFolderError: the fit isn't finished, or its summary can't be read.
+        """
+        if not self.finished:
+            raise RunFolderError(f"{self.path}: an unfinished fit; {RESUME} makes it")
         try:
-            predictor = ByTangents(keys, quiet, quantities)
-        except ConfigError as error:
-            predictor = ByDifferences(keys, quiet, quantities)
-            predictor.how += f" ({error.problems[0].what})"
-        times = np.linspace(float(keys.scene.start), float(keys.scene.samples.last), _ALONG_ROWS)
-        weighing = Weighing(keys, readings, predictor)
-        ended, costs, more = search(weighing, experiment.config.fit.starts, told or (lambda _: None))
-        notes = list(dict.fromkeys(text for one in readings for text in one.told))
-        along = weighing.along(ended.values, times)
-        return result_of(
-            experiment.config.name, keys, weighing, ended, costs, predictor.how, [*notes, *more], along, times
-        )
+            return FitResult.model_validate_json(self.summary.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise RunFolderError(f"{self.summary}: can't be read ({error}); {_AGAIN}") from None
+
+    def read_dataset(self) -> xarray.Dataset:
+        """The dataset of a finished fit.
+
+        Raises:
+            RunFolderError: it can't be read.
+        """
+        self.read_result()
+        try:
+            return xarray.load_dataset(self.dataset, engine="h5netcdf", decode_times=False)
+        except (OSError, ValueError) as error:
+            raise RunFolderError(f"{self.dataset}: can't be read ({error}); {_AGAIN}") from None
+
+    def copies(self, experiment: Experiment) -> list[DataFiles]:
+        """The kept data of a config."""
+        assert experiment.config.fit is not None
+        found = []
+        for number, table in enumerate(experiment.config.fit.data, start=1):
+            numbers = [f"{number}", *(f"{number}_{k}" for k in range(1, len(table.kernels) + 1))]
+            names = [Path(name) for name in (table.file, *table.kernels)]
+            pairs = zip(numbers, names, strict=True)  # the folder of a run is kept as its dataset
+            found.append(tuple(self.data / f"{n}_{x.stem}{x.suffix or '.h5'}" for n, x in pairs))
+        return found
+
+
+def identity(experiment: Experiment, sources: Sequence[DataFiles]) -> dict[str, Any]:
+    """What the bits of a fit depend on: config, data, kernels and versions."""
+    kernels = [[digest(path) for path in files[1:]] for files in sources]
+    return {
+        "kind": KIND,
+        "text_sha256": hashlib.sha256(experiment.text.encode()).hexdigest(),
+        "data_sha256": [digest(files[0]) for files in sources],
+        **({"kernels_sha256": kernels} if any(kernels) else {}),
+        "versions": {
+            "rigidsim": __version__, "heyoka": heyoka.__version__, "numpy": np.__version__,
+            "python": platform.python_version(),
+        },
+    }  # fmt: skip

@@ -16,7 +16,7 @@ from rigidsim.solve.by_keys import turned
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.tangents import LostTangents
 from rigidsim.workflows.fit.keys import FitKeys
-from rigidsim.workflows.fit.observed import QUATERNION, Observed
+from rigidsim.workflows.fit.observations import QUATERNION, Observed
 from rigidsim.workflows.run import run
 from rigidsim.workflows.sensitivity import Tangents
 

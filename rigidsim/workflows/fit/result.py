@@ -18,21 +18,25 @@ import numpy as np
 import xarray
 from pydantic import PrivateAttr
 
+from rigidsim.errors import RunFolderError
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.row_rotations import turned
+from rigidsim.scene.row_rotations import conjugated, multiplied, normalised, turned, vector_of
+from rigidsim.store.run import ShownRun
 from rigidsim.store.summary_parts import SummaryPart
-from rigidsim.workflows.fit.estimation import Ended, Solution, consider_covariance
+from rigidsim.workflows.fit.estimation import Ended, Solution, Weighing, consider_covariance
 from rigidsim.workflows.fit.keys import FitKey, FitKeys
-from rigidsim.workflows.fit.observed import QUATERNION
+from rigidsim.workflows.fit.observations import QUATERNION, Readings
 from rigidsim.workflows.fit.predictions import Prediction
-from rigidsim.workflows.fit.readings import Readings
-from rigidsim.workflows.fit.searching import Weighing
+from rigidsim.workflows.run import run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 KIND = "fit"
-_ROUNDING = 1e-6  # of a direction's largest part, below which another may be rounding
+_COVARIANCE = "attitude_covariance"
+_ROUNDING = 1e-6  # rad: between two ways of integrating a motion that isn't chaotic
+_SHARE = 0.1  # of a sigma, by which these may differ where the motion amplifies both
+_NOTHING = 1e-6  # of a direction's largest part, below which another may be rounding
 _PART = 1e-3  # of a direction of norm one, below which a number takes no part in it
 
 
@@ -175,10 +179,8 @@ class FitResult(SummaryPart):
         """The fitted motion in the viewer, with a cone of one standard deviation about the figure axis, or a
         picture of it; arguments, value and errors are those of ``Run.view``.
         """
-        from rigidsim.workflows.fit.seen import fitted_run  # which loads what runs are made with
-
-        run = fitted_run(self.experiment, self.dataset, self.folder or "memory")
-        return run.view(web=web, png=png, at=at, part=part)
+        shown = fitted_run(self.experiment, self.dataset, self.folder or "memory")
+        return shown.view(web=web, png=png, at=at, part=part)
 
     def __repr__(self) -> str:
         lines = [f"<FitResult {self.name!r}: {self.sentence}"]
@@ -390,7 +392,7 @@ def _along(along: Prediction, spread: Callable[[np.ndarray], np.ndarray], keys: 
             more = {"units": "rad2", "long_name": "predicted covariance of the attitude as a rotation vector"}
             pole = turned(values, np.array([[float(x) for x in keys.scene.figure.pole]]))
             made["other_space_axis"] = list("XYZ")
-            made["attitude_covariance"] = (("time", axes, "other_space_axis"), found, more)
+            made[_COVARIANCE] = (("time", axes, "other_space_axis"), found, more)
             made["figure_axis"] = (("time", axes), pole, {"units": "1"})
             words |= {"long_name": f"{words['long_name']}, space axes", "frame": "space axes"}
     return xarray.Dataset(made)
@@ -410,7 +412,7 @@ def _directions(null: np.ndarray, scales: np.ndarray, sizes: np.ndarray) -> tupl
     scaled = np.abs(directions * scales)
     scaled /= np.maximum(scaled.max(axis=1, keepdims=True), 1e-300)
     # what data hardly depend on has a small part of its column's size, and all the same moves along
-    return directions, (scaled > _PART) | ((np.abs(directions / sizes) > _PART) & (scaled > _ROUNDING))
+    return directions, (scaled > _PART) | ((np.abs(directions / sizes) > _PART) & (scaled > _NOTHING))
 
 
 def _counted_twice(sets: Sequence[Readings]) -> list[str]:
@@ -462,3 +464,45 @@ def _direction_text(keys: Sequence[FitKey], values: np.ndarray, amounts: np.ndar
 
 def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
+
+
+# --- a fitted motion --------------------------------------------------------------------------------------
+
+
+def fitted_run(experiment: Experiment, fit: xarray.Dataset, source: str = "memory") -> ShownRun:
+    """Run a fitted experiment at the times of its fit's dataset, and put the predicted covariance beside it.
+
+    Args:
+        experiment: with the estimated values. fit: the fit's dataset.
+
+    Raises:
+        RunFolderError: the experiment's motion isn't that of the dataset.
+    """
+    asked = experiment.config.output.record
+    more = asked is not None and QUATERNION not in asked and _COVARIANCE in fit
+    record = [*asked, QUATERNION] if more and asked else None
+    # without its own error, which would mislead beside the fit's
+    made = run(experiment.quiet(record, fit["time"].values.tolist()), out=None, progress=False)
+    found = made.dataset
+    if found.sizes["time"] != fit.sizes["time"]:
+        raise RunFolderError(f"{source}: the fitted motion {made.outcome.message}, before the fit's own end")
+    if _COVARIANCE in fit:
+        covariance = fit[_COVARIANCE].variable.copy()
+        covariance.attrs["covariance_of"] = "attitude"
+        _refuse_other(found, fit, source)
+        found = found.assign({_COVARIANCE: covariance})
+    shown = found.assign_attrs(fit=str(fit.attrs.get("sentence", "")))
+    return ShownRun(Path(source), made.outcome, shown)
+
+
+def _refuse_other(found: xarray.Dataset, fit: xarray.Dataset, source: str) -> None:
+    """Refuse a config that was changed since: its motion would have another uncertainty."""
+    here, there = (normalised(one[QUATERNION].values) for one in (found, fit))
+    apart = np.linalg.norm(vector_of(multiplied(here, conjugated(there))), axis=1)
+    sigma = np.sqrt(np.nan_to_num(np.einsum("tii->t", fit[_COVARIANCE].values), nan=np.inf))
+    worst = int(np.argmax(apart - _SHARE * sigma))
+    if apart[worst] > max(_ROUNDING, _SHARE * sigma[worst]):
+        raise RunFolderError(
+            f"{source}: the motion of fitted.toml is {apart[worst]:.2g} rad from the fit's dataset "
+            f"at {found['time'].values[worst]:.6g} s; was it changed? rigidsim verify {source} checks it"
+        )

@@ -22,8 +22,7 @@ from rigidsim.store import atomic
 from rigidsim.store.sweeps.run import FittedOfMembers
 from rigidsim.store.sweeps.tiles import Kept, KeptVariable
 from rigidsim.workflows.fit.fitting import fit_to
-from rigidsim.workflows.fit.folder import content, digest
-from rigidsim.workflows.fit.readings import DataFiles
+from rigidsim.workflows.fit.observations import DataFiles, content, digest
 from rigidsim.workflows.fit.result import FitResult
 
 _NUMBERS = {
@@ -53,7 +52,7 @@ def copies_of(experiment: Experiment, folder: Path) -> list[DataFiles]:
     """The data of a member in the folder of copies."""
     assert experiment.config.fit is not None
     return [
-        DataFiles(_copy(folder, table.file), tuple(_copy(folder, one) for one in table.kernels))
+        tuple(_copy(folder, given) for given in (table.file, *table.kernels))
         for table in experiment.config.fit.data
     ]
 

@@ -21,7 +21,7 @@ from rigidsim.store.sweeps.run import SavedSweep, open_sweep
 from rigidsim.store.sweeps.sources import Sources
 from rigidsim.store.sweeps.tiles import identity, read_tile
 from rigidsim.store.variables import SCHEMA_VERSION
-from rigidsim.workflows.fit.readings import folder_of
+from rigidsim.workflows.fit.observations import folder_of
 from rigidsim.workflows.read import Given, as_experiment, reads_kernels
 from rigidsim.workflows.sweeps.batch import why_alone
 from rigidsim.workflows.sweeps.executors import Workers, cluster, processes

@@ -1,10 +1,16 @@
-"""Observations of a fit: their times in seconds of the run, values and standard deviations in SI."""
+"""Observations of a fit: what each set observes, and its times in seconds of the run, values and standard
+deviations in SI. What is observed is a variable that can be recorded, or an expression, which becomes one for
+the fit's time.
+"""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any, get_args
 
@@ -14,14 +20,29 @@ from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.formats import ck_reading
 from rigidsim.formats.attitude_messages import MESSAGE_COLUMNS
 from rigidsim.formats.trajectories import Trajectory, config_unit, read_columns
+from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.names import written
+from rigidsim.model.observables.observable import Observable
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import parse_number
+from rigidsim.scene.expressions.names import names_of
+from rigidsim.scene.expressions.parser import parse_expression
+from rigidsim.scene.expressions.tree import ExpressionError, names_used, states_read
 from rigidsim.scene.fit_table import FitDataTable
+from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.row_rotations import normalised, of_euler
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.schema import Config
 from rigidsim.scene.space_axes import SpaceAxes
-from rigidsim.workflows.fit.observed import EULER_ANGLES, QUATERNION, Observed
+from rigidsim.scene.validation_messages import nearest
+from rigidsim.solve.problem import prepare
+from rigidsim.store.variables import LABELS
 
+_PREFIX = "fit_expression_"
+QUATERNION, EULER_ANGLES = "quaternion", "euler_angles"
+"""Variables that are attitudes; what is computed of any is the former."""
+_ROTATIONS = (QUATERNION, EULER_ANGLES)
+_STATES = ("attitude", "flight")
 _META = b"KPL/MK"
 _NORM = 1e-2  # by which the norm of a quaternion may differ from 1
 _LEAST, _MOST = 1e-150, 1e150  # of a standard deviation, whose square has to be a double
@@ -29,16 +50,110 @@ _SIGMAS = f"a standard deviation above zero, from {_LEAST:g} to {_MOST:g}, is al
 
 
 @dataclass(frozen=True)
-class DataFiles:
-    """Where the file of a ``[[fit.data]]`` is, and the kernels that it is read with, if it is a CK."""
+class Observed:
+    """One observable.
 
-    file: Path
-    kernels: tuple[Path, ...] = ()
+    Attributes:
+        text: as the config says it. name: of the variable that is recorded for it.
+        form: "quaternion" or "euler_angles" for attitudes, "angle" for others that turn, otherwise "plain".
+        components: default names of its columns. unit: SI; None for an expression, of any.
+    """
+
+    text: str
+    name: str
+    form: str
+    components: tuple[str, ...]
+    unit: str | None
 
     @property
-    def all(self) -> tuple[Path, ...]:
-        """The file, then the kernels."""
-        return (self.file, *self.kernels)
+    def rotation(self) -> bool:
+        """Whether it is an attitude, whose residuals are rotation vectors."""
+        return self.form in _ROTATIONS
+
+    @property
+    def variable(self) -> str:
+        """Name of what is recorded for it; any attitude as a quaternion."""
+        return "quaternion" if self.rotation else self.name
+
+    @property
+    def config_unit(self) -> str | None:
+        """``unit`` as configs write it."""
+        return None if self.unit is None else config_unit(self.unit)
+
+
+@contextmanager
+def observing(experiment: Experiment) -> Iterator[tuple[list[Observed], Experiment]]:
+    """What each ``[[fit.data]]`` observes, with the experiment that records it; expressions can be recorded
+    inside the block only.
+
+    Raises:
+        ConfigError: something can't be recorded in this scene.
+    """
+    table = experiment.config.fit
+    assert table is not None
+    texts = [data.observable for data in table.data]
+    own = [state.name for state in experiment.config.states]
+    names, also, entered = [], list[str](), list[str]()
+    try:
+        for number, text in enumerate(texts, start=1):
+            name = QUATERNION if text in _ROTATIONS else text
+            if text not in OBSERVABLES and text not in own:
+                name = f"{_PREFIX}{texts.index(text)}"
+                OBSERVABLES[name], states = _expression(name, text, experiment.config, number)
+                entered.append(name)
+                also += [state for state in states if state in own]
+            names.append(name)
+        quiet = experiment.quiet([*dict.fromkeys([*names, *also])], events=[], fit=None)
+        recorded = {one.name: one for one in prepare(quiet).system.recorded}
+        found = []
+        for text, name in zip(texts, names, strict=True):
+            one, expression = recorded[name], name in entered
+            labels = [LABELS.get(dim, [str(i) for i in range(one.count)]) for dim in one.dims]
+            form, unit = "plain" if expression else "angle" if one.units == "rad" else "plain", one.units
+            if text in _ROTATIONS:
+                form = text
+            if text == EULER_ANGLES:
+                labels, unit = [LABELS["euler_angle"]], "rad"
+            shown = "value" if expression else text
+            components = tuple("_".join([shown, *parts]) for parts in product(*labels))
+            found.append(
+                Observed(text, text if form == text else name, form, components, None if expression else unit)
+            )
+        yield found, quiet
+    finally:
+        for name in entered:
+            OBSERVABLES.pop(name, None)
+
+
+def _expression(name: str, text: str, config: Config, number: int) -> tuple[Observable, frozenset[str]]:
+    """An expression as an observable, with the states that it reads."""
+    try:
+        parsed = parse_expression(text, names_of(config), parameters=config.parameters)
+    except ExpressionError as error:
+        near = nearest(text, list(OBSERVABLES))
+        what = f'"{text}" is no variable that can be recorded{near}, nor an expression: {error}'
+        raise ConfigError(Problem(f"[[fit.data]] number {number} observable", what)) from None
+    if not names_used(parsed):
+        what = f'given "{text}", which never changes'
+        raise ConfigError(Problem(f"[[fit.data]] number {number} observable", what))
+    states = states_read(parsed)
+    observable = Observable(
+        name, (), "1", text, partial(_written, text), needs=tuple(s for s in _STATES if s in states)
+    )
+    return observable, states
+
+
+def _written(text: str, m: Kinematics) -> list[Any]:
+    """The expression of a scene, with its own values of ``[parameters]``."""
+    config = m.scene.config
+    return written(m, [parse_expression(text, names_of(config), parameters=config.parameters)])
+
+
+# --- readings ----------------------------------------------------------------------------------------------
+
+
+DataFiles = tuple[Path, ...]
+"""Where the file of a ``[[fit.data]]`` is, and the kernels that it is read with, if it is a CK."""
 
 
 def folder_of(experiment: Experiment) -> Path:
@@ -51,8 +166,17 @@ def files_beside(experiment: Experiment) -> list[DataFiles]:
     """The data of a config where they lie."""
     assert experiment.config.fit is not None
     beside = folder_of(experiment)
-    tables = experiment.config.fit.data
-    return [DataFiles(beside / x.file, tuple(beside / one for one in x.kernels)) for x in tables]
+    return [tuple(beside / x for x in (one.file, *one.kernels)) for one in experiment.config.fit.data]
+
+
+def content(path: Path) -> bytes:
+    """Bytes of a file, or of the dataset of a run's folder."""
+    return (path / "dataset.h5" if path.is_dir() else path).read_bytes()
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file, or of the dataset of a run's folder."""
+    return hashlib.sha256(content(path)).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -112,7 +236,6 @@ class _Reader:
 
     def readings(self) -> Readings:
         self.found = found = self._opened()
-        file = self.files.file / "dataset.h5" if self.files.file.is_dir() else self.files.file
         told = [f"{self.table.file}: {note}" for note in found.notes]
         times, values = self._times(), self._values()
         sigmas = self._sigmas(len(times))
@@ -141,17 +264,17 @@ class _Reader:
                 "counts as an observation"
             )
         limit = None if self.table.outliers is None else float(self.table.outliers)
-        digest = hashlib.sha256(file.read_bytes()).hexdigest()
         return Readings(
-            self.number, self.quantity, self.table.file, digest, times, values, sigmas, rows, limit, told
-        )
+            self.number, self.quantity, self.table.file, digest(self.files[0]), times, values, sigmas, rows,
+            limit, told,
+        )  # fmt: skip
 
     def _fault(self, key: str, what: str) -> ConfigError:
         return ConfigError(Problem(f"[[fit.data]] number {self.number} {key}", what))
 
     def _opened(self) -> Trajectory:
         """The rows of a file; of a CK, which holds dates, and attitudes relative to J2000, as it has them."""
-        file, kernels = self.files.file, self.files.kernels
+        file, *kernels = self.files
         if not kernels and file.suffix.lower() != ck_reading.SUFFIX:
             saved = file / "dataset.h5"  # where the file is the folder of a run
             return read_columns(saved if saved.is_file() else file).in_axes(self.scene.axes)
