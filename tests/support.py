@@ -159,7 +159,7 @@ def amplification(experiment: rigidsim.Experiment, points: int = 120) -> float:
 def unoptimised_code() -> Iterator[None]:
     """What heyoka compiles isn't optimised, which takes a tenth of the time and rounds otherwise."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(hy, "taylor_adaptive", _unoptimised(hy.taylor_adaptive, most=500))
+        patch.setattr(hy, "taylor_adaptive", _unoptimised(hy.taylor_adaptive, most=60))
         patch.setattr(hy, "cfunc", _unoptimised(hy.cfunc, most=2000))
         with compiled.kept_in(_UNOPTIMISED):
             yield

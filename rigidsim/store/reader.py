@@ -33,6 +33,10 @@ _MOST_VARIABLES = 10_000
 _GROUPS = ("checkpoint", "events")
 _BARE = b"This is a netCDF dimension but not a netCDF variable"
 """Beginning of the ``NAME`` of the empty variable that netCDF-4 keeps for a dimension without coordinates."""
+_OF_NETCDF = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid"}
+_OF_NETCDF |= {"_Netcdf4Coordinates", "_NCProperties"}
+_AT_ONCE = 1 << 16
+"""Numbers of a variable that are read when its file is opened (half a megabyte)."""
 
 
 def open_dataset(
@@ -55,11 +59,13 @@ def open_dataset(
     """
     try:
         inspect(path)
-        options: Any = {"decode_cf": decoded, "create_default_indexes": indexed}
-        if more or status is not None:
-            opened = xarray.open_dataset(_Segments([path, *more], status), engine="store", **options)
-        else:
-            opened = xarray.open_dataset(path, engine="h5netcdf", **options)
+        opened = xarray.open_dataset(
+            _Files([path, *more], status),
+            engine="store",
+            decode_cf=decoded,
+            create_default_indexes=indexed,
+        )
+        opened.encoding["source"] = str(path)
     except RunFolderError:
         raise
     except Exception as error:  # HDF5 and its readers raise many kinds on files that aren't whole
@@ -133,7 +139,7 @@ def _check_numbers(item: Any, name: str, path: Path) -> None:
     """Require that every declared row is stored, so that none is read as a fill value."""
     if item.dtype.kind not in "fiuSOV" or item.dtype.hasobject:
         raise RunFolderError(f"{path}: the variable {name!a} holds no numbers")
-    if name != "time" and bytes(item.attrs.get("NAME", b"")).startswith(_BARE):
+    if name != "time" and _without_coordinates(item):
         return
     size = item.size or 0
     if item.chunks is None:
@@ -145,35 +151,66 @@ def _check_numbers(item: Any, name: str, path: Path) -> None:
         raise RunFolderError(f"{path}: the variable {name!a} declares {size} numbers that it lacks")
 
 
-class _Segments(AbstractDataStore):
-    """Segments of an unfinished run as one file, for xarray."""
+class _Files(AbstractDataStore):
+    """A dataset, or the segments of an unfinished run as one file, for xarray: what h5netcdf reads, in a sixth
+    of its time.
+    """
 
     def __init__(self, paths: Sequence[Path], status: str | None) -> None:
         self._paths, self._status = paths, status
 
     def load(self) -> tuple[dict[str, xarray.Variable], dict[str, Any]]:
-        """Variables along time and labels, and the attributes of the first segment."""
-        rows = [root_attributes(path)["rows"] for path in self._paths]
-        starts = np.concatenate([[0], np.cumsum(rows)])
-        with open_dataset(self._paths[0], indexed=False, decoded=False) as first:
-            found: dict[str, xarray.Variable] = {}
-            unused = _not_begun(first, self._paths[-1])
-            for name, variable in first.variables.items():
-                if variable.dims[:1] == ("time",) and name not in unused:
-                    along = indexing.LazilyIndexedArray(_Joined(self._paths, starts, str(name), variable))
-                    found[str(name)] = xarray.Variable(variable.dims, along, variable.attrs)
-                elif name in LABELS or name in OF_THE_RUN:
-                    found[str(name)] = variable.load()
-            return found, dict(first.attrs, **({} if self._status is None else {"status": self._status}))
+        """All variables, and the attributes of the first file."""
+        first = self._paths[0]
+        with reading(first) as file:
+            attributes = _read_attributes(file.attrs)
+            if self._status is not None:
+                attributes["status"] = self._status
+            items = {
+                name: item
+                for name, item in file.items()
+                if isinstance(item, h5py.Dataset) and not _without_coordinates(item)
+            }
+            for name in _not_begun(file, self._paths[-1]) if self._status is not None else ():
+                del items[name]
+            return {name: self._variable(name, item) for name, item in items.items()}, attributes
+
+    def _variable(self, name: str, item: h5py.Dataset) -> xarray.Variable:
+        dims = [dim[0].name.lstrip("/") if len(dim) else name for dim in item.dims]
+        values: Any
+        if item.dtype.kind == "O":
+            values = item.asstr()[()].astype(str)
+        elif len(self._paths) == 1 and item.size <= _AT_ONCE:
+            values = item[()]
+        else:
+            paths = self._paths if dims[0] == "time" else self._paths[:1]
+            rows = [len(item) if path == paths[0] else root_attributes(path)["rows"] for path in paths]
+            starts = np.concatenate([[0], np.cumsum(rows)])
+            values = indexing.LazilyIndexedArray(_Joined(paths, starts, name, item.shape[1:], item.dtype))
+        return xarray.Variable(dims, values, _read_attributes(item.attrs), {"dtype": item.dtype})
 
 
-def _not_begun(first: xarray.Dataset, last: Path) -> set[str]:
+def _read_attributes(stored: Mapping[str, Any]) -> dict[str, Any]:
+    """Attributes of an HDF5 object, without the ones by which netCDF-4 holds dimensions."""
+    return {
+        name: value if isinstance(value, str) or len(value) != 1 else value[0]
+        for name, value in stored.items()
+        if name not in _OF_NETCDF
+    }
+
+
+def _without_coordinates(item: h5py.Dataset) -> bool:
+    """Whether a dataset only stands for a dimension that has no coordinates."""
+    return bytes(item.attrs.get("NAME", b"")).startswith(_BARE)
+
+
+def _not_begun(first: h5py.File, last: Path) -> set[str]:
     """Names of the variables of corrections put back in a run that ends before its projection begins: they
     are zero throughout, and the dataset leaves them out.
     """
     if "hold_from_step" not in first.attrs:
         return set()
-    names = {str(name) for name, variable in first.variables.items() if "put_back_of" in variable.attrs}
+    names = {name for name, item in first.items() if "put_back_of" in item.attrs}
     with reading(last) as file:
         rows = rows_in(file)
         begun = any(name in rows and len(rows[name]) and float(rows[name][-1]) != 0.0 for name in names)
@@ -183,9 +220,11 @@ def _not_begun(first: xarray.Dataset, last: Path) -> set[str]:
 class _Joined(BackendArray):
     """One variable along all segments, read on access."""
 
-    def __init__(self, paths: Sequence[Path], starts: np.ndarray, name: str, like: xarray.Variable) -> None:
+    def __init__(
+        self, paths: Sequence[Path], starts: np.ndarray, name: str, shape: tuple[int, ...], dtype: np.dtype
+    ) -> None:
         self._paths, self._starts, self._name = paths, starts, name
-        self.shape, self.dtype = (int(starts[-1]), *like.shape[1:]), like.dtype
+        self.shape, self.dtype = (int(starts[-1]), *shape), dtype
 
     def __getitem__(self, key: Any) -> Any:
         basic = indexing.IndexingSupport.BASIC
