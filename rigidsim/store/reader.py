@@ -152,8 +152,8 @@ def _check_numbers(item: Any, name: str, path: Path) -> None:
 
 
 class _Files(AbstractDataStore):
-    """A dataset, or the segments of an unfinished run as one file, for xarray: what h5netcdf reads, in a third
-    of its time.
+    """A dataset, or the segments of an unfinished run as one file, for xarray: what h5netcdf reads, in a
+    third of its time.
     """
 
     def __init__(self, paths: Sequence[Path], status: str | None) -> None:
