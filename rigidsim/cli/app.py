@@ -19,6 +19,7 @@ import typer
 from rigidsim import __version__
 from rigidsim.cli import options
 from rigidsim.cli.exits import exit_code
+from rigidsim.formats import FORMATS
 from rigidsim.look.figure_names import FIGURES
 
 app = typer.Typer(
@@ -82,7 +83,21 @@ def _program(
 
 
 @_command("configs")
-def new(scene: options.SceneArgument = None, name: options.NameArgument = None) -> None:
+def new(
+    scene: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="SCENE",
+            help="Its name, or another that it is known by.",
+            autocompletion=options.offered("scenes"),
+            show_default=False,
+        ),
+    ] = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(metavar="NAME", help="Of the experiment and its file NAME.toml; default SCENE."),
+    ] = None,
+) -> None:
     """Write a ready scene to start from, with the tables it reads; alone, list those there are by subject.
 
     An existing file is never replaced.
@@ -93,7 +108,9 @@ def new(scene: options.SceneArgument = None, name: options.NameArgument = None) 
 
 @_command("configs")
 def check(
-    configs: options.Configs, overrides: options.SetOption = None, as_json: options.JsonOption = False
+    configs: Annotated[list[Path], typer.Argument(metavar="CONFIG...", help=options.CONFIGS)],
+    overrides: options.SetOption = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Validate configs, and show what was understood of them; nothing is run.
 
@@ -105,11 +122,22 @@ def check(
 
 @_command("run")
 def run(
-    configs: options.AnyConfigs = None,
-    dataset: options.FromOption = None,
+    configs: Annotated[
+        list[Path] | None, typer.Argument(metavar="CONFIG...", help=options.CONFIGS, show_default=False)
+    ] = None,
+    dataset: Annotated[
+        Path | None, options.option("--from", "DATASET", "Run the config that a dataset embeds.")
+    ] = None,
     out: options.OutOption = Path("runs"),
     overrides: options.SetOption = None,
-    scan: options.ScanOption = None,
+    scan: Annotated[
+        list[str] | None,
+        options.option(
+            "--sweep",
+            "KEY=SPEC",
+            "Run once for each value of a key, time.end=[1,2] or KEY=linspace(0,1,11); repeatable.",
+        ),
+    ] = None,
     member: options.MemberOption = None,
     force: Annotated[bool, options.replacing("Replace a run of the same name.")] = False,
     as_json: options.JsonOption = False,
@@ -126,9 +154,19 @@ def sweep(
     config: options.ConfigPath,
     out: options.OutOption = Path("runs"),
     overrides: options.SetOption = None,
-    workers: options.WorkersOption = None,
-    scheduler: options.SchedulerOption = None,
-    tiles: options.TilesOption = None,
+    workers: Annotated[
+        int | None,
+        options.option("--workers", "N", "Processes of this machine that run members; default 1.", min=1),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        options.option(
+            "--scheduler", "ADDRESS", "Dask scheduler whose workers run members (rigidsim[cluster])."
+        ),
+    ] = None,
+    tiles: Annotated[
+        str | None, options.option("--tiles", "A:B", "Only tiles A to B-1: a share, for job arrays.")
+    ] = None,
     force: Annotated[bool, options.replacing("Replace what lies there.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -144,9 +182,17 @@ def sweep(
 @_command("sweep")
 def resume(
     run_path: options.RunPath,
-    until: options.UntilOption = None,
-    overrides: options.GuardOption = None,
-    workers: options.ResumeWorkersOption = None,
+    until: Annotated[
+        str | None, options.option("--until", "END", 'A later end, such as "2 h" or 5000.')
+    ] = None,
+    overrides: Annotated[
+        list[str] | None,
+        options.option("--set", "KEY=VALUE", "A guard of this session, such as limits.max_steps=1000000."),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        options.option("--workers", "N", "Of a sweep: processes that run members; default 1.", min=1),
+    ] = None,
     as_json: options.JsonOption = False,
     verbose: options.VerboseOption = False,
 ) -> None:
@@ -161,8 +207,13 @@ def resume(
 @_command("sweep")
 def verify(
     run_path: options.RunPath,
-    members: options.MembersOption = None,
-    back: options.ReversedOption = False,
+    members: Annotated[
+        int | None,
+        options.option("--members", "N", "Of a sweep: how many members, drawn at random; default 100."),
+    ] = None,
+    back: Annotated[
+        bool, typer.Option("--reversed", help="Integrate to the end and back, too: how close does it return?")
+    ] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Integrate the embedded config again and compare: identical, or what differs first. Exit code 1 then.
@@ -176,8 +227,11 @@ def plan(
     config: options.ConfigPath,
     overrides: options.SetOption = None,
     out: options.OutOption = Path("runs"),
-    physics: options.PhysicsOption = None,
-    write: options.WriteOption = None,
+    physics: Annotated[
+        str | None,
+        options.option("--physics", "ERROR", 'Find the least model within an angle, as "0.1 arcsec".'),
+    ] = None,
+    write: Annotated[Path | None, options.option("--write", "FILE", "With --physics: its config.")] = None,
     force: Annotated[bool, options.replacing("With --physics: replace earlier runs and the file.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -193,14 +247,34 @@ def plan(
 @_command("compare")
 def compare(
     config: options.ConfigPath,
-    file: options.TrajectoryPath,
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="CSV, Parquet, netCDF, AEM or CK, or the folder of a run.")
+    ],
     overrides: options.SetOption = None,
-    within: options.WithinOption = 1e-9,
-    convention: options.ConventionOption = None,
-    out: options.ComparisonOption = None,
-    figure: options.ComparedFigureOption = None,
-    timeline: options.ComparedTimelineOption = None,
-    kernels: options.KernelsOption = None,
+    within: Annotated[
+        float, options.option("--within", "RAD", "Largest angle between attitudes that agree, in rad.")
+    ] = 1e-9,
+    convention: Annotated[
+        str | None,
+        options.option(
+            "--convention", "KEY=VALUE,...", "What is known of it, as order=xyzw,rate_axes=space."
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        options.option("--out", "FILE", "Dataset of what was found along time, such as comparison.h5."),
+    ] = None,
+    figure: Annotated[Path | None, options.option("--figure", "FILE", "Figure, a .png or a .svg.")] = None,
+    timeline: Annotated[
+        Path | None,
+        options.option("--timeline", "FILE", "Timeline (.rrd) of both bodies, with the angle between them."),
+    ] = None,
+    kernels: Annotated[
+        list[Path] | None,
+        options.option(
+            "--kernels", "FILE", "Clock (SCLK) and leap seconds that a CK is read with; repeatable."
+        ),
+    ] = None,
     force: Annotated[bool, options.replacing("Replace existing files.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -214,9 +288,13 @@ def compare(
 @_command("fit")
 def fit(
     config: options.ConfigPath,
-    out: options.FitsOption = Path("fits"),
+    out: Annotated[
+        Path, options.option("--out", "DIR", "Folder of the fits' folders; an interrupted fit there goes on.")
+    ] = Path("fits"),
     overrides: options.SetOption = None,
-    write: options.FittedOption = None,
+    write: Annotated[
+        Path | None, options.option("--write", "FILE", "Config with the estimated values, ready to be run.")
+    ] = None,
     member: options.MemberOption = None,
     force: Annotated[bool, options.replacing("Replace a fit of the same name, and the file.")] = False,
     as_json: options.JsonOption = False,
@@ -238,15 +316,36 @@ def info(run_path: options.RunPath, as_json: options.JsonOption = False) -> None
 
 @_command("results")
 def view(
-    run_paths: options.RunPaths,
-    web: options.WebOption = False,
-    png: options.PictureOption = None,
-    gif: options.FilmOption = None,
-    mp4: options.VideoOption = None,
-    seconds: options.FilmLengthOption = None,
-    member: options.MembersSeenOption = None,
-    at: options.MomentOption = None,
-    part: options.PartOption = None,
+    run_paths: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RUN...",
+            help="Folders of runs (runs/NAME) or fits (fits/NAME), their dataset.h5, or other tools' files; "
+            "several go side by side.",
+            autocompletion=options.offered("runs"),
+        ),
+    ],
+    web: Annotated[bool, typer.Option("--web", help="In the browser, served on loopback only.")] = False,
+    png: Annotated[Path | None, options.option("--png", "FILE", "Draw a picture, without a display.")] = None,
+    gif: Annotated[Path | None, options.option("--gif", "FILE", "Draw a film, without a display.")] = None,
+    mp4: Annotated[Path | None, options.option("--mp4", "FILE", "The same; needs rigidsim[film].")] = None,
+    seconds: Annotated[
+        float | None, typer.Option("--seconds", min=0.5, max=120.0, help="That a film lasts; default 6.")
+    ] = None,
+    member: Annotated[
+        list[int] | None,
+        typer.Option("--member", metavar="N", min=0, help="Of a sweep: member N, from 0; repeatable."),
+    ] = None,
+    at: Annotated[
+        str | None,
+        options.option("--at", "TIME", 'Moment of a picture, in the scene\'s unit or as "2.4 hr".'),
+    ] = None,
+    part: Annotated[
+        str | None,
+        options.option(
+            "--part", "PART", "Of the page, in pictures and films: page (the default), scene or plots."
+        ),
+    ] = None,
 ) -> None:
     """Open timelines in the rerun viewer (drawn first, where a run has none), or draw them to a file.
 
@@ -262,9 +361,26 @@ _EACH_FIGURE = "\n".join(f"{name:17}{told}" for name, told in FIGURES.items())
 
 @_command("results", f"\n\n\b\nFigures:\n{_EACH_FIGURE}")
 def plot(
-    run_path: options.SeenPath, what: options.WhatOption = None, out: options.FigureOption = None,
-    for_slides: options.SlidesOption = None,
-) -> None:  # fmt: skip
+    run_path: options.SeenPath,
+    what: Annotated[
+        list[str] | None,
+        options.option("--what", "NAME", "Figure to draw; repeatable. all: every one the run has."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        options.option(
+            "--out",
+            "FILE",
+            "PNG or SVG, or a folder for several; default figure.png or figure_NAME.png in the run.",
+        ),
+    ] = None,
+    for_slides: Annotated[
+        str | None,
+        options.option(
+            "--for-slides", "GROUND", "One panel in large letters on a light or dark ground: light or dark."
+        ),
+    ] = None,
+) -> None:
     """Draw the page that suits the scene, or the figures named; of a sweep a variable over its axes.
 
     Example: rigidsim plot runs/intermediate_axis --what polhode --out flip.svg
@@ -276,10 +392,19 @@ def tradeoff(
     config: options.ConfigPath,
     overrides: options.SetOption = None,
     out: options.OutOption = Path("runs"),
-    budget: options.BudgetOption = 90.0,
-    repeats: options.RepeatsOption = 3,
-    full: options.FullOption = False,
-    files: options.WithFilesOption = None,
+    budget: Annotated[float, options.option("--budget", "SECONDS", "Time that it may take, roughly.")] = 90.0,
+    repeats: Annotated[
+        int, options.option("--repeats", "N", "Fresh processes in which speeds are taken.")
+    ] = 3,
+    full: Annotated[
+        bool, typer.Option("--full", help="Every tolerance in every formulation; needs a larger budget.")
+    ] = False,
+    files: Annotated[
+        list[str] | None,
+        options.option(
+            "--with", "FILE,SECONDS", "Another tool's trajectory, and the CPU time it took; repeatable."
+        ),
+    ] = None,
     force: Annotated[bool, options.replacing("Replace an earlier measurement.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -293,15 +418,50 @@ def tradeoff(
 @_command("results")
 def export(
     run_path: options.RunPath,
-    file_format: options.FormatOption,
-    out: options.ExportPathOption = None,
+    file_format: Annotated[
+        str, options.option("--format", "FORMAT", f"{', '.join(FORMATS[:-1])} or {FORMATS[-1]}.")
+    ],
+    out: Annotated[
+        Path | None, options.option("--out", "PATH", "Default NAME.FORMAT in this folder.")
+    ] = None,
     force: Annotated[bool, options.replacing("Replace what is there.")] = False,
-    angle_unit: options.AngleUnitOption = None,
-    epoch: options.EpochOption = None,
-    axes: options.AxesOption = None,
-    object_name: options.ObjectNameOption = None,
-    object_id: options.ObjectIdOption = None,
-    variable: options.ExportedOption = None,
+    angle_unit: Annotated[
+        str | None,
+        options.option(
+            "--angle-unit",
+            "UNIT",
+            "For csv, parquet and zarr: rad, turns, deg, arcsec or mas; columns are named by it.",
+        ),
+    ] = None,
+    epoch: Annotated[
+        str | None,
+        options.option(
+            "--epoch",
+            "TIME",
+            "What time 0 is, where the config doesn't say, for aem, oem, ck, pck and the dates of csv: "
+            '"2029-04-13T21:46:00 TDB".',
+        ),
+    ] = None,
+    axes: Annotated[
+        str | None,
+        options.option(
+            "--axes",
+            "NAME",
+            "For aem, oem, ck, pck: the space axes, where the config doesn't say: ICRF, EME2000, ...",
+            "--frame",
+        ),
+    ] = None,
+    object_name: Annotated[
+        str | None,
+        options.option("--object-name", "NAME", "For aem and oem; the frame's name for ck and pck."),
+    ] = None,
+    object_id: Annotated[
+        str | None,
+        options.option("--object-id", "ID", "For aem and oem; for ck and pck NAIF's, 301 or moon."),
+    ] = None,
+    variable: Annotated[
+        list[str] | None, options.option("--variable", "NAME", "Only this variable, along time; repeatable.")
+    ] = None,
 ) -> None:
     """Write a run for other tools: tables with every digit, CCSDS messages, or kernels of SPICE.
 
@@ -314,9 +474,22 @@ def export(
 @_command("results")
 def analyse(
     run_path: options.SeenPath,
-    variable: options.VariableOption = None,
+    variable: Annotated[
+        list[str] | None,
+        options.option(
+            "--variable",
+            "NAME",
+            "A variable (obliquity) or one of its signals (obliquity.figure); repeatable. Default: "
+            "the main signals of the scene.",
+        ),
+    ] = None,
     lines: Annotated[int, typer.Option("--lines", metavar="N", help="Of each signal at most.")] = 20,
-    out: options.AnalysisOption = None,
+    out: Annotated[
+        Path | None,
+        options.option(
+            "--out", "FILE", "Dataset; default analysis.h5 in the run. The figure goes next to it."
+        ),
+    ] = None,
     force: Annotated[bool, options.replacing("Replace an existing analysis.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:

@@ -70,7 +70,7 @@ class _ActiveRun:
         system, progress = prepared.system, Progress(prepared.clock.count)
         statistics = SampleStatistics([i.name for i in system.invariants], [r.name for r in system.recorded])
         trail = SampleTrail(prepared.precision)
-        cost = RunCost(session.effort, progress)
+        cost = RunCost(session.watch, progress)
         beside = None
         if prepared.sensitivity_keys:
             from rigidsim.session.sensitivity import Sensitivity  # which few runs need
@@ -92,7 +92,7 @@ class _ActiveRun:
         self.interruption = Interruption()
         if beside is not None:
             beside.go_on = self._wanted
-        session.phases.next("build")
+        session.watch.next("build")
         session.observer.started(prepared, None if folder is None else folder.path)
         session.observer.phase("integrate")
         guards = Guards(prepared, statistics, self.interruption, session.observer)
@@ -116,7 +116,7 @@ class _ActiveRun:
 
     def cost(self) -> Cost:
         """Cost of the run so far, all of its sessions together."""
-        return cost_so_far(self.prepared, self.progress, self.session.phases, self.session.effort)
+        return cost_so_far(self.prepared, self.progress, self.session.watch)
 
     def save(self) -> None:
         """Save where it stands, to go on from there."""
@@ -127,7 +127,7 @@ class _ActiveRun:
         progress = self.driver.run()
         if not progress.status.final:
             self.save()
-        self.session.phases.next("integrate_and_record")
+        self.session.watch.next("integrate_and_record")
         self.session.observer.progressed(progress)
 
     def spectrum(self) -> LyapunovSpectrum | None:
@@ -141,7 +141,7 @@ class _ActiveRun:
             spectrum = lyapunov.spectrum_of(
                 self.prepared, self._folder, self._run_id, self.interruption, seconds
             )
-        session.phases.next("lyapunov")
+        session.watch.next("lyapunov")
         self._heed_interruption()
         return spectrum
 
@@ -156,12 +156,12 @@ class _ActiveRun:
         with self.interruption.dispensable():
             found = found.estimated(trail, parts.corrected, self._wanted, self.parts.stepper.errors)
             found = replace(found, cheaper=cheaper_model(found, session.tuning.advice, self._wanted))
-        session.phases.next("estimate")
+        session.watch.next("estimate")
         if not prepared.system.formulation.resolves_rotation and self.progress.status is Status.FINISHED:
             session.observer.phase("modelling")
             with self.interruption.dispensable():
                 found = found.modelled(trail, self._wanted)
-            session.phases.next("modelling")
+            session.watch.next("modelling")
         self._heed_interruption()
         return found
 
@@ -178,7 +178,6 @@ class _ActiveRun:
     def summarised(self, found: Diagnostics, spectrum: LyapunovSpectrum | None) -> Summary:
         """The summary without the digests of files that are still to be written."""
         prepared, progress, log = self.prepared, self.progress, self.parts.log
-        self.session.phases.engine(progress.integration_seconds)
         crossings = enumerate(prepared.system.events)
         return summarise(
             found,
@@ -223,11 +222,11 @@ def _completed(
         unused = dataset.unused_variables(run.prepared, run.progress.steps)
         attributes = run.ended(summary)
         writer.complete(folder.dataset, attributes, extras, unused=unused, checkpoint=last, conclude=conclude)
-        session.phases.next("dataset")
+        session.watch.next("dataset")
         output = run.prepared.scene.config.output
         summary = with_timeline(summary, folder, output, session.observer)
         if summary.timeline_sha256 is not None:
-            session.phases.next("timeline")
+            session.watch.next("timeline")
     except KeyboardInterrupt:
         done = "the dataset is complete, the timeline is missing"
         if folder.segments.exists():

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -147,78 +147,72 @@ class Tuning:
 NOT_KEPT = "attempts_not_kept"
 
 
-@dataclass
-class Effort:
-    """Cost of a run over all its sessions; what is given counts those before this one."""
+class Stopwatch:
+    """Wall and CPU seconds (of all threads) of a run: of all sessions, and of this one by phase."""
 
-    sessions: int = 1
-    wall_seconds: float = 0.0
-    cpu_seconds: float = 0.0
-    started: float = field(default_factory=time.perf_counter)
-    cpu_started: float = field(default_factory=time.process_time)
+    def __init__(self) -> None:
+        self.sessions = 1
+        self.before = np.zeros(2)  # of earlier sessions
+        self.phases: dict[str, np.ndarray] = {}
+        self._begun = self._since = _now()
+
+    def next(self, finished: str) -> None:
+        """Close the current phase under a name; repeated names add up."""
+        now = _now()
+        self.phases[finished] = self.phases.get(finished, np.zeros(2)) + now - self._since
+        self._since = now
 
     @property
-    def wall(self) -> float:
-        """Wall seconds of all sessions."""
-        return self.wall_seconds + time.perf_counter() - self.started
+    def spent(self) -> np.ndarray:
+        """Wall and CPU seconds of all sessions."""
+        return np.asarray(self.before + _now() - self._begun)
 
-    @property
-    def cpu(self) -> float:
-        """CPU seconds of all sessions."""
-        return self.cpu_seconds + time.process_time() - self.cpu_started
+    def begin_again(self) -> None:
+        """Another attempt begins: the time of this one counts as a single phase, but for the choice's."""
+        lost = [spent for name, spent in self.phases.items() if name != "choose"]
+        self.phases = {name: spent for name, spent in self.phases.items() if name == "choose"}
+        self.phases[NOT_KEPT] = sum(lost, np.zeros(2))
+
+    def as_dict(self, engine: float) -> dict[str, Any]:
+        """Fields of ``Cost``; ``engine``: seconds of the engine alone in all sessions, part of the phases."""
+        wall, cpu = self.spent.tolist()
+        each = {name: spent.tolist() for name, spent in self.phases.items()}
+        return {
+            "seconds": {name: spent[0] for name, spent in each.items()} | {ENGINE: engine},
+            "cpu_by_phase": {name: spent[1] for name, spent in each.items()},
+            "cpu_seconds": cpu,
+            "wall_seconds": wall,
+            "sessions": self.sessions,
+        }
+
+
+def _now() -> np.ndarray:
+    return np.array([time.perf_counter(), time.process_time()])
 
 
 @dataclass
 class RunCost:
     """What a run has cost in all of its sessions, as a part of checkpoints."""
 
-    effort: Effort
+    watch: Stopwatch
     progress: Progress
     version: ClassVar[int] = 1
 
     def pack(self) -> Arrays:
-        effort, progress = self.effort, self.progress
+        watch, progress = self.watch, self.progress
         return {
             "steps_seen": np.array([progress.smallest_step, progress.largest_step]),
-            "effort": np.array([effort.wall, effort.cpu, progress.integration_seconds]),
-            "sessions": np.array([effort.sessions, progress.redone_steps], dtype=np.int64),
+            "effort": np.append(watch.spent, progress.integration_seconds),
+            "sessions": np.array([watch.sessions, progress.redone_steps], dtype=np.int64),
         }
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        effort, progress = self.effort, self.progress
+        watch, progress = self.watch, self.progress
         progress.smallest_step, progress.largest_step = numbers(arrays, "steps_seen", 2)
-        effort.wall_seconds, effort.cpu_seconds, progress.integration_seconds = numbers(arrays, "effort", 3)
+        wall, cpu, progress.integration_seconds = numbers(arrays, "effort", 3)
+        watch.before = np.array([wall, cpu])
         sessions, redone = numbers(arrays, "sessions", 2)
-        effort.sessions, progress.redone_steps = int(sessions) + 1, int(redone)
-
-
-class Phases:
-    """Wall and CPU seconds (of all threads) by phase of one session, in the order in which they ended."""
-
-    def __init__(self) -> None:
-        self.wall: dict[str, float] = {}
-        self.cpu: dict[str, float] = {}
-        self._since = time.perf_counter(), time.process_time()
-
-    def next(self, finished: str) -> None:
-        """Close the current phase under a name; repeated names add up."""
-        now = time.perf_counter(), time.process_time()
-        for seconds, begin, end in zip((self.wall, self.cpu), self._since, now, strict=True):
-            seconds[finished] = seconds.get(finished, 0.0) + end - begin
-        self._since = now
-
-    def engine(self, seconds: float) -> None:
-        """Note the time of the engine alone in all sessions; it is part of other phases."""
-        self.wall[ENGINE] = seconds
-
-    def begin_again(self) -> "Phases":
-        """Phases for another attempt: this one's time counts as a single phase, but for the choice's."""
-        again = Phases()
-        for old, new in ((self.wall, again.wall), (self.cpu, again.cpu)):
-            new |= {name: seconds for name, seconds in old.items() if name == "choose"}
-            new[NOT_KEPT] = sum(v for name, v in old.items() if name not in ("choose", ENGINE))
-        again._since = self._since
-        return again
+        watch.sessions, progress.redone_steps = int(sessions) + 1, int(redone)
 
 
 @dataclass
@@ -230,12 +224,10 @@ class Session:
     observer: Observer
     remarks: list[Caution] = field(default_factory=list)
     mixed: str = ""
-    effort: Effort = field(default_factory=Effort)
-    phases: Phases = field(default_factory=Phases)
+    watch: Stopwatch = field(default_factory=Stopwatch)
     tuning: Tuning = field(default_factory=Tuning)
 
     def another(self) -> "Session":
         """Session for the next attempt after this one missed the accuracy; its cost includes this one's."""
-        return Session(
-            self.observer, effort=self.effort, phases=self.phases.begin_again(), tuning=self.tuning
-        )
+        self.watch.begin_again()
+        return Session(self.observer, watch=self.watch, tuning=self.tuning)

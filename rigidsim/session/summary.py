@@ -9,7 +9,7 @@ from rigidsim.accuracy.modelling import modelling_of
 from rigidsim.scene.cautions import Caution
 from rigidsim.session.dataset import unused_variables
 from rigidsim.session.diagnostics import Diagnostics, advice_on
-from rigidsim.session.session import Effort, Phases
+from rigidsim.session.session import Stopwatch
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, told_loads
 from rigidsim.solve.lyapunov import LyapunovSpectrum
 from rigidsim.solve.problem import InitialValueProblem
@@ -80,7 +80,7 @@ def summarise(
     )
 
 
-def cost_so_far(prepared: InitialValueProblem, progress: Progress, phases: Phases, effort: Effort) -> Cost:
+def cost_so_far(prepared: InitialValueProblem, progress: Progress, watch: Stopwatch) -> Cost:
     """Cost of the run so far."""
     exponent = prepared.system.scaling.time
     return Cost(
@@ -88,11 +88,7 @@ def cost_so_far(prepared: InitialValueProblem, progress: Progress, phases: Phase
         steps_redone=progress.redone_steps,
         smallest_step=_seconds(progress.smallest_step, exponent),
         largest_step=_seconds(progress.largest_step, exponent),
-        seconds=dict(phases.wall),
-        cpu_seconds=effort.cpu,
-        cpu_by_phase=dict(phases.cpu),
-        sessions=effort.sessions,
-        wall_seconds=effort.wall,
+        **watch.as_dict(progress.integration_seconds),
     )
 
 

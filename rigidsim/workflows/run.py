@@ -23,6 +23,7 @@ from rigidsim.store.folder import RunFolder
 from rigidsim.store.outputs import refuse_inputs
 from rigidsim.store.run import MemoryRun, Run, SavedRun
 from rigidsim.store.summary import Summary
+from rigidsim.store.summary_parts import ENGINE
 from rigidsim.workflows.read import Experiment, Given, as_experiment
 
 AnyRun = TypeVar("AnyRun", bound=Run)
@@ -127,7 +128,7 @@ def _run(
                     raise
                 return result  # no dearer setting is left to try
         if choice is not None:
-            session.phases.next("choose")
+            session.watch.next("choose")
         prepared = prepare(setting, loads=loads)
         refuse_taken_names(prepared)
         with _place(prepared, out, setting.text, force=force or beyond is not None) as folder:
@@ -199,13 +200,7 @@ def certified(
         cautions = [c for c in cautions if c.code != WarningCode.ATTITUDE_UNCERTAIN]
     else:
         cautions.append(Caution(WarningCode.NOT_CERTIFIED, doubt))
-    session.phases.next("certify")
-    phases, effort = session.phases, session.effort
-    cost = summary.cost.having(
-        seconds=dict(phases.wall),
-        cpu_by_phase=dict(phases.cpu),
-        cpu_seconds=effort.cpu,
-        wall_seconds=effort.wall,
-    )
+    session.watch.next("certify")
+    cost = summary.cost.having(**session.watch.as_dict(summary.cost.seconds[ENGINE]))
     summary = summary.warned(cautions).having(accuracy=summary.accuracy.having(**known), cost=cost)
     return result.concluded(summary), doubt is None

@@ -8,7 +8,7 @@ from rigidsim.cli.exits import refuse_options
 from rigidsim.cli.screens.summary import print_run
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.scene import build_scene
-from rigidsim.session import progress
+from rigidsim.session.progress import watched
 from rigidsim.session.understood import cautions_about, cautions_of
 from rigidsim.store.outputs import refuse_inputs
 from rigidsim.workflows.read import embedded, load
@@ -45,7 +45,7 @@ def run(
         acting = bool(config.loads or config.events) and config.sweep is None
         for caution in cautions_of(build_scene(experiment)) if acting else cautions_about(config):
             print(f"rigidsim: warning: {experiment.source}: {caution.text}", file=sys.stderr)
-        with progress.observer() as observer:
+        with watched(None, True) as observer:
             result = workflow.run(experiment, out=out, force=force, observer=observer)
         code = print_run(result, as_json, verbose=verbose)
         worst = worst or code

@@ -13,7 +13,7 @@ from rigidsim.cli.screens.sweeps import SweepProgress, print_sweep
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.sweeps.values import scanned
-from rigidsim.session import progress
+from rigidsim.session.progress import meter, watched
 from rigidsim.store.fits import is_fit
 from rigidsim.store.sweeps.folder import is_sweep
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
@@ -30,10 +30,10 @@ def sweep(
     if scheduler is not None:
         refuse_options("is for processes of this machine, and --scheduler has its own", workers=workers)
     experiment = load(config, overrides=overrides or [])
-    with SweepProgress() as watching:
+    with meter() as shown:
         result = workflow.sweep(
             experiment, out=out, force=force, workers=workers or 1, scheduler=scheduler, tiles=share,
-            observer=watching,
+            observer=SweepProgress(shown),
         )  # fmt: skip
     code = _print(result, as_json)
     return 0 if result.finished or share is not None else code
@@ -45,9 +45,11 @@ def run_scanned(
     """Sweep each config over the axes of ``run --sweep``."""
     worst = 0
     for experiment in experiments:
-        with SweepProgress() as watching:
+        with meter() as shown:
             motion = experiment if experiment.config.fit is None else experiment.having(["fit="])
-            result = workflow.sweep(scanned(motion, scan), out=out, force=force, observer=watching)
+            result = workflow.sweep(
+                scanned(motion, scan), out=out, force=force, observer=SweepProgress(shown)
+            )
         worst = worst or _print(result, as_json)
     return worst
 
@@ -68,13 +70,13 @@ def resume(
         refuse_options(f"is for sweeps; {run_path} is a run, which one process integrates", workers=workers)
         if as_json:
             refuse_options("is for people, and --json always prints everything", verbose=verbose)
-        with progress.observer() as observer:
+        with watched(None, True) as observer:
             run = resuming.resume(run_path, until=until, overrides=overrides or [], observer=observer)
         return print_run(run, as_json, verbose=verbose)
     what = f"is for runs, and {run_path} is a sweep; change its config and give rigidsim sweep CONFIG again"
     refuse_options(f"{what} (that computes only what is new)", **of_runs)
-    with SweepProgress() as watching:
-        result = workflow.resume_sweep(run_path, workers=workers or 1, observer=watching)
+    with meter() as shown:
+        result = workflow.resume_sweep(run_path, workers=workers or 1, observer=SweepProgress(shown))
     return _print(result, as_json)
 
 
@@ -91,7 +93,7 @@ def verify(run_path: Path, members: int | None, back: bool, as_json: bool) -> in
     if is_sweep(run_path):
         verdict, what = verify_sweep(run_path, members=MEMBERS if members is None else members), "member"
     else:
-        with progress.observer() as observer:
+        with watched(None, True) as observer:
             verdict, what = verifying.verify(run_path, reversed=back, observer=observer), "sample"
     told = verdict.as_dict()
     answer(as_json, told, print_verdict, told, what)

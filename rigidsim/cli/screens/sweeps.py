@@ -1,76 +1,44 @@
 """Output for sweeps: progress over members, and how they ended."""
 
 import shlex
-import sys
 import time
 from pathlib import Path
-from typing import Self
-
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
 
 from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.session.progress import clock_text
+from rigidsim.session.progress import Meter, clock_text, left_text
 from rigidsim.store.sweeps.run import FittedOfMembers, SavedSweep
 from rigidsim.workflows.fit.result import digits_text
 from rigidsim.workflows.sweeps.plan import SweepPlan
 from rigidsim.workflows.sweeps.sweep import SweepObserver
 
-_LINE_EVERY = 5.0  # seconds between plain lines
-
 
 class SweepProgress(SweepObserver):
-    """One bar, or a plain line every few seconds if none can be drawn."""
+    """Shows a sweep on a meter."""
 
-    def __init__(self) -> None:
-        columns = (TextColumn("[bold]{task.description}"), BarColumn(None), TextColumn("{task.fields[said]}"))
-        hidden = not sys.stderr.isatty()
-        self._bar = Progress(
-            *columns, console=Console(stderr=True), transient=True, expand=True, disable=hidden
-        )
-        self._name = ""
-
-    def __enter__(self) -> Self:
-        self._bar.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if not self._bar.disable:  # some versions of rich print an empty line then
-            self._bar.stop()
+    def __init__(self, meter: Meter) -> None:
+        self._meter = meter
 
     def checking(self, sweep: Sweep) -> None:
-        self._name = sweep.experiment.config.name
-        self._say(f"{sweep.count:,} members: trying out what they are made of")
+        self._meter.name = sweep.experiment.config.name
+        self._meter.phase(f"{sweep.count:,} members: trying out what they are made of")
 
     def started(self, folder: Path, members: int, done: int) -> None:
-        self._members, self._before = members, done
-        self._begin = self._latest = time.perf_counter()
+        self._members, self._before, self._begin = members, done, time.perf_counter()
         there = f", {done:,} are there already" if done else ""
-        self._say(f"running {members:,} members into {folder}{there}")
-        self._task = self._bar.add_task(self._name, total=members, completed=done, said="")
+        self._meter.phase(f"running {members:,} members into {folder}{there}")
 
     def progressed(self, done: int) -> None:
-        now = time.perf_counter()
-        rate = (done - self._before) / max(now - self._begin, 1e-9)
-        said = f"{done:,} of {self._members:,} members, {rate:.3g} a second, "
-        said += f"{clock_text((self._members - done) / rate if rate else None)} left"
-        self._bar.update(self._task, completed=done, said=said)
-        if self._bar.disable and now - self._latest >= _LINE_EVERY:
-            self._latest = now
-            self._say(said)
+        elapsed, new = max(time.perf_counter() - self._begin, 1e-9), done - self._before
+        left = left_text(elapsed, new / max(self._members - self._before, 1))
+        said = f"{done:,} of {self._members:,} members, {new / elapsed:.3g} a second, {left}"
+        self._meter.update(done / max(self._members, 1), said)
 
     def completing(self) -> None:
-        self._say("writing dataset.h5")
+        self._meter.phase("writing dataset.h5")
 
     def nothing_left(self) -> None:
-        self._say("nothing is left to do: all members were run before", always=True)
-
-    def _say(self, text: str, *, always: bool = False) -> None:
-        if self._bar.disable:
-            print(f"{self._name}: {text}", file=sys.stderr, flush=True)
-        elif always:
-            self._bar.console.print(f"{self._name}: {text}", highlight=False, markup=False)
+        self._meter.note(f"{self._meter.name}: nothing is left to do: all members were run before")
 
 
 _INTEGRATED = "momentum's direction (attitude in full models), of its integration alone"
