@@ -1,7 +1,8 @@
 """Verifying a run bit for bit: integrated again from its config and compared number by number."""
 
+import json
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -176,25 +177,21 @@ def _file_problems(dataset: Path, folder: RunFolder | None) -> list[str]:
 
 def _compare(saved: Path, again: Path) -> tuple[list[str], Difference | None, int]:
     """Names of the variables that differ, the earliest difference, and the number of samples."""
-    differing: list[str] = []
-    earliest: Difference | None = None
+    found: dict[str, Difference | None] = {}
     with open_dataset(saved, **_AS_STORED) as one, open_dataset(again, **_AS_STORED) as other:
         names = {str(n) for file in (one, other) for n, v in file.variables.items() if v.dtype.kind == "f"}
         for name in sorted(names):
-            known = name in one.variables and name in other.variables
-            if not known or one[name].shape != other[name].shape:
-                differing.append(name)
-                continue
+            comparable = name in one.variables and name in other.variables
+            comparable = comparable and one[name].shape == other[name].shape
+            first = None
             try:
-                found = _first_difference(name, one[name], other[name])
+                first = _first_difference(name, one[name], other[name]) if comparable else None
             except OSError:  # rows that can't be unpacked; the seal has told that the file is damaged
-                differing.append(name)
-                continue
-            if found is not None:
-                differing.append(name)
-                if earliest is None or found.sample < earliest.sample:
-                    earliest = found
-        return differing, earliest, one.sizes["time"]
+                comparable = False
+            if first is not None or not comparable:
+                found[name] = first
+        earliest = min(filter(None, found.values()), key=lambda one: one.sample, default=None)
+        return list(found), earliest, one.sizes["time"]
 
 
 def _first_difference(name: str, one: xarray.DataArray, other: xarray.DataArray) -> Difference | None:
@@ -219,60 +216,44 @@ def first_unequal(one: np.ndarray, other: np.ndarray) -> tuple[int, float, float
 
 
 def _summary_problems(saved: Brief, again: Brief, folder: RunFolder) -> list[str]:
-    """The first claim of a summary that running again doesn't confirm, in words; empty if all hold."""
+    """The first claim of a summary that running again doesn't confirm, in words; empty if all hold.
+
+    A claim that a part of the summary lacks isn't made; but an invariant has its part.
+    """
     if not isinstance(saved, Summary):
         return []  # a run that was killed claims nothing
     # once there is a dataset, an interruption can only have hit its timeline or its segments' removal
     ended = saved.status != Status.INTERRUPTED.value
-    claims = (_claims(summary, ended=ended) for summary in (saved, again))
-    found = list(_differences("", *claims))
-    if not found:
-        return []
+    claims, now = (dict(_claims(summary, ended)) for summary in (saved, again))
+    tables, parts = ({key.rpartition(".")[0] for key in made} for made in (claims, now))
+    found = [
+        f"there is no {part}, which there is when run again"
+        for part in sorted(parts - tables)
+        if "." in part and part.partition(".")[0] in {table.partition(".")[0] for table in tables}
+    ]
+    found += [
+        f"{key} is {value[:120]}, {now.get(key, 'which there is not')[:120]} when run again"
+        for key, value in claims.items()
+        if value != now.get(key, "null")
+    ]
     more = f" (and {len(found) - 1} more of its claims don't hold)" if len(found) > 1 else ""
-    return [f"{folder.summary}: says that {found[0]}{more}"]
+    return [f"{folder.summary}: says that {found[0]}{more}"] if found else []
 
 
-def _claims(part: BaseModel, *, ended: bool) -> dict[str, Any]:
-    """The fields marked as claims, in this part and in parts within, as plain values."""
-    found: dict[str, Any] = {}
+def _claims(part: BaseModel, ended: bool, where: str = "") -> Iterator[tuple[str, str]]:
+    """The fields marked as claims, in this part and in parts within, as dotted names with JSON."""
     given = part.model_dump(mode="json", exclude_unset=True)
-    for name in (n for n in type(part).model_fields if n in given):
-        marks = type(part).model_fields[name].metadata
-        claim, value = next((m for m in marks if isinstance(m, Claim)), None), getattr(part, name)
+    for name, field_info in type(part).model_fields.items():
+        value, key = getattr(part, name), f"{where}{name}"
+        claim = next((mark for mark in field_info.metadata if isinstance(mark, Claim)), None)
         if claim is not None:
-            if ended or not claim.of_end:
-                found[name] = given[name]
+            if name in given and (ended or not claim.of_end):
+                yield key, json.dumps(given[name], sort_keys=True)
         elif isinstance(value, BaseModel):
-            found[name] = _claims(value, ended=ended)
+            yield from _claims(value, ended, f"{key}.")
         elif isinstance(value, dict):
-            parts = {key: item for key, item in value.items() if isinstance(item, BaseModel)}
-            found[name] = {key: _claims(item, ended=ended) for key, item in parts.items()}
-    return found
-
-
-_ABSENT = object()
-
-
-def _differences(name: str, saved: Any, again: Any) -> Iterator[str]:
-    """Claims that differ; one that is missing in the summary doesn't count."""
-    if isinstance(saved, Mapping) and isinstance(again, Mapping):
-        for key in [*again, *(k for k in saved if k not in again)]:
-            there, inner = saved.get(key, _ABSENT), f"{name}.{key}".lstrip(".")
-            if there is _ABSENT and name and isinstance(again[key], Mapping):
-                yield f"there is no {inner}, which there is when run again"
-            else:
-                yield from _differences(inner, there, again.get(key, _ABSENT))
-    elif saved is _ABSENT or (saved is None and again is _ABSENT):
-        return
-    elif again is _ABSENT:
-        yield f"{name} is {_short(saved)}, which there isn't when run again"
-    elif type(saved) is not type(again) or saved != again:
-        yield f"{name} is {_short(saved)}, {_short(again)} when run again"
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 120 else text[:117] + "..."
+            for inner, item in value.items():
+                yield from _claims(item, ended, f"{key}.{inner}.") if isinstance(item, BaseModel) else ()
 
 
 def _timeline_problems(saved: Brief, folder: RunFolder) -> list[str]:
