@@ -17,9 +17,7 @@ from rigidsim.model.averaged.orbit_terms import (
 from rigidsim.model.averaged.sources import Source
 from rigidsim.model.load import Load, Term
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.model.orbits.prescribed import OrbitStates, element_states
-from rigidsim.model.placements.point_mass import PlacedAsMass
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor
@@ -100,18 +98,6 @@ class AveragedMechanics(Mechanics):
         c, s = self._turned(orbit.inclination, 0)
         node_c, node_s = self._turned(orbit.ascending_node, orbit.node_rate)
         return [node_s * s, -(node_c * s), c]
-
-    def _in_plane(self, orbit: KeplerOrbit) -> tuple[Symbolic, Symbolic, Symbolic | None]:
-        """Position over a, from the node, and a/r if it varies."""
-        mean = self._moving(orbit.mean_anomaly, orbit.mean_motion)
-        if orbit.circular:
-            return hy.cos(mean), hy.sin(mean), None
-        context, e = self.scene.context, orbit.eccentricity
-        anomaly = hy.kepE(hy.expression(self.number(e)), mean)
-        c, sine = hy.cos(anomaly), hy.sin(anomaly)
-        x, y = c - self.number(e), self.number(context.sqrt(1 - e * e)) * sine
-        w_c, w_s = self._turned(orbit.periapsis, orbit.periapsis_rate)
-        return w_c * x - w_s * y, w_s * x + w_c * y, 1.0 / (1.0 - self.number(e) * c)
 
     def _turned(self, angle: Any, rate: Any) -> tuple[Symbolic, Symbolic]:
         """Cosine and sine of an angle that advances uniformly."""
@@ -227,43 +213,14 @@ class AveragedMechanics(Mechanics):
         return total([self._pull_of(source, s) for source in self.of.sources])
 
     def _pull_of(self, source: Source, s: list[Symbolic]) -> list[Symbolic]:
-        orbit = source.of.orbit
-        if orbit is not None:
-            return self._pull_in_plane(source, orbit, s)
-        if isinstance(source.of.placement, PlacedAsMass):
-            return self._pull_of_mass(source, source.of.placement.pair, s)
-        place = source.of.placement.seen(self)
+        place, distance = source.of.placement.seen(self), source.of.placement.distance(self.scene.context)
         factor = self._strength(source) * dot(place.line, s) * place.inverse**3
+        if place.unit != distance:
+            factor = self.number((distance / place.unit) ** 3) * factor
         return [factor * x for x in place.line]
 
     def _strength(self, source: Source) -> Symbolic:
         return as_factor(self.number(self.of.rate(source) * self.unit))
-
-    def _pull_in_plane(self, source: Source, orbit: KeplerOrbit, s: list[Symbolic]) -> list[Symbolic]:
-        """The same pull from components in the orbit's plane, whose node may turn, with fewer products."""
-        tilt_c, tilt_s = self._turned(orbit.inclination, 0)
-        node_c, node_s = self._turned(orbit.ascending_node, orbit.node_rate)
-        first = node_c * s[0] + node_s * s[1]
-        second = node_c * s[1] - node_s * s[0]
-        raised = tilt_c * second + tilt_s * s[2]
-        x, y, inverse = self._in_plane(orbit)
-        factor = self._strength(source) * (x * first + y * raised)
-        if inverse is not None:
-            factor = factor * inverse**5
-        along, up = factor * x, factor * y
-        level = tilt_c * up
-        return [node_c * along - node_s * level, node_s * along + node_c * level, tilt_s * up]
-
-    def _pull_of_mass(self, source: Source, pair: PointMassPair, s: list[Symbolic]) -> list[Symbolic]:
-        """The same pull of a point mass beside the body, k a^3 (s . x) x / |x|^5."""
-        context, scaling = self.scene.context, self.scaling
-        states = self.carried(self.point_masses)
-        ends = min(pair.host, pair.number), max(pair.host, pair.number)  # either direction will do
-        place, inverse = states.between(*ends), states.inverse_distances[ends]
-        cubed = self.number(context.ldexp(source.of.placement.distance(context) ** 3, -3 * scaling.length))
-        size = cubed * self._strength(source)
-        factor = size * (dot(place, s) * (inverse * inverse * inverse * (inverse * inverse)))
-        return [factor * x for x in place]
 
     # --- what is recorded -----------------------------------------------------------------------------------
 
