@@ -38,7 +38,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.fixed_axes import keeps, parallel
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.orbit_planes import FlightPlane, KeplerPlane, OrbitPlane, TablePlane
+from rigidsim.model.orbit_planes import OrbitPlane, flight_plane, kepler_plane, table_plane
 from rigidsim.model.rotations import Symbolic, along, apply, transpose, unit
 from rigidsim.scene.arithmetic import Matrix, Vector, cross, norm
 from rigidsim.scene.frame import ORBIT
@@ -86,9 +86,8 @@ def reference_plane(m: Mechanics) -> ReferencePlane:
 def orbit_plane(m: Mechanics, loads: Sequence[Load]) -> ReferencePlane:
     """The plane of the first load that has one."""
     plane = _orbit_plane(loads)
-    fixed = plane.fixed(m.scene)
-    if fixed is not None:
-        return fixed_plane(m, fixed, plane.described)
+    if plane.drift == 0:
+        return fixed_plane(m, plane.at_start(m.scene), plane.described)
     return _moving(plane.normal(m), plane.described)
 
 
@@ -106,7 +105,7 @@ def initial_plane(scene: Scene, load: Load) -> Matrix:
 
 def plane_drift(scene: Scene, loads: Sequence[Load]) -> Any | None:
     """Bound of the rate (rad/s) at which the plane turns; None if unknown."""
-    return scene.context.zero if scene.reference is not None else _orbit_plane(loads).drift(scene)
+    return scene.context.zero if scene.reference is not None else _orbit_plane(loads).drift
 
 
 def plane_of(load: Load | None) -> OrbitPlane | None:
@@ -114,10 +113,10 @@ def plane_of(load: Load | None) -> OrbitPlane | None:
     if load is None or load.plane is not None:
         return None if load is None else load.plane
     if load.orbit is not None:
-        return KeplerPlane(load.orbit)
+        return kepler_plane(load.orbit)
     if load.table is not None:
-        return TablePlane(load.table)
-    return None if load.attracting_point is None else FlightPlane(load.attracting_point)
+        return table_plane(load.table)
+    return None if load.attracting_point is None else flight_plane(load.attracting_point)
 
 
 def _orbit_plane(loads: Sequence[Load]) -> OrbitPlane:

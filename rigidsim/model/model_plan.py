@@ -19,9 +19,8 @@ from rigidsim.model.formulations.formulation import (
     Requirements,
     Unsuited,
 )
+from rigidsim.model.formulations.plain import Quaternion, Rates
 from rigidsim.model.formulations.planar import Planar
-from rigidsim.model.formulations.quaternion import Quaternion
-from rigidsim.model.formulations.rates import Rates
 from rigidsim.model.frames import refuse_without_plane
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.load_estimate import estimate_drive, orbit_tags

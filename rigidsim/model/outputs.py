@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,7 +12,7 @@ import rigidsim.model.partial_invariants  # noqa: F401  (enters what it defines 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.euler_poles import Poles
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.observables.own_states import own_observables
+from rigidsim.model.observables.observable import Observable
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.scene.registry import OBSERVABLES
@@ -80,6 +80,17 @@ def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list
         recorded.append(variable)
         outputs += components
     return recorded, outputs
+
+
+def own_observables(m: Mechanics) -> Iterator[Observable]:
+    """The recorded variable of each user-defined state, which default records have."""
+    for state in m.scene.states:
+        unit = m.scaling.own.get(state.name, 0)
+        yield Observable(
+            state.name, (), state.unit or "1", f"{state.name}, a state of [[states]]",
+            lambda _, name=state.name: [hy.make_vars(name)], lambda _, unit=unit: [unit],
+            attributes=lambda _: {"given_by": "[[states]]"},
+        )  # fmt: skip
 
 
 _UNIT = "1 by definition: any drift is rounding"

@@ -22,7 +22,7 @@ import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.formulations.formulation import ModelPlan
-from rigidsim.model.formulations.quaternion import Quaternion
+from rigidsim.model.formulations.plain import Quaternion
 from rigidsim.model.load import Load
 from rigidsim.model.model_plan import plan_model
 from rigidsim.model.outputs import recorded_variables

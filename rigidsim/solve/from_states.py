@@ -13,7 +13,7 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.formulations.quaternion import Quaternion
+from rigidsim.model.formulations.plain import Quaternion
 from rigidsim.model.model_plan import plan_model
 from rigidsim.model.observables.mechanical import WORK
 from rigidsim.model.outputs import drift_outputs

@@ -4,8 +4,6 @@ from rigidsim.model.formulations import (  # noqa: F401  (each enters itself; a 
     averaged,
     canonical,
     euler_angles,
+    plain,
     planar,
-    quaternion,
-    rates,
-    rotation_matrix,
 )

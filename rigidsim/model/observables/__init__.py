@@ -4,8 +4,7 @@ One module per subject. Importing this package registers the observables in the 
 """
 
 from rigidsim.model.observables import mechanical  # noqa: F401, I001  (enters what it defines)
-from rigidsim.model.observables import axes, rotation, orbit, top, point_masses, rotors, shape  # noqa: F401
-from rigidsim.model.observables import climate, core, kernel_bodies  # noqa: F401
+from rigidsim.model.observables import axes, rotation, orbit, top, point_masses, parts, climate  # noqa: F401
 from rigidsim.model.observables.observable import (
     Angle as Angle,
     Observable as Observable,

@@ -7,6 +7,10 @@ With a unit axis a = (u, v, s) along the plane's X', Y' and normal n
 
 the latter of n x a, where the equator whose pole is a rises through the plane: luni-solar precession makes it
 decrease. Neither loses digits at any angle.
+
+The kind decides what is recorded by default: a planet that precesses has directions and their angles; a body
+that turns nearly about its figure axis has polar motion, wobble and a rotation angle; other bodies have
+neither.
 """
 
 from __future__ import annotations
@@ -16,6 +20,7 @@ from collections.abc import Callable, Mapping
 import heyoka as hy
 
 from rigidsim.model.frames import reference_plane
+from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import (
     SPACE,
@@ -26,8 +31,10 @@ from rigidsim.model.observables.observable import (
     register_all,
     told,
 )
-from rigidsim.model.observables.steadiness import is_planet
 from rigidsim.model.rotations import Symbolic, apply, unit
+from rigidsim.model.scaling import source_rate
+from rigidsim.scene.arithmetic import apply as multiply
+from rigidsim.scene.arithmetic import cross, dot, norm
 from rigidsim.scene.space_axes import ECLIPTIC, obliquity, to_equator
 
 AXIS = ("axis",)
@@ -75,6 +82,50 @@ def _sky(convention: str) -> Callable[[Mechanics], Mapping[str, str]]:
 
     return told(against, figure=True)
 
+
+# --- the kind of rotation, by which some variables are recorded by default ----------------------------------
+
+_AXIAL = 0.1
+"""Angle (rad) between spin and figure axis up to which a body turns nearly about it."""
+_FAST = 10
+"""Ratio of a planet's spin to its sources' rates; a slower body librates or tumbles with its source."""
+
+
+def _turns_about_its_figure(m: Mechanics) -> bool:
+    """Whether the body starts turning nearly about its figure axis, a principal one."""
+    scene, context = m.scene, m.scene.context
+    spin, pole = scene.angular_velocity, scene.figure.pole
+    if all(w == 0 for w in spin):
+        return False
+    aligned, across = abs(dot(spin, pole)), norm(context, cross(pole, spin))
+    turned = multiply(scene.body.inertia, pole)
+    principal = norm(context, cross(turned, pole)) <= norm(context, turned) * 1e-12
+    return bool(across <= _AXIAL * aligned) and principal
+
+
+def _moves(load: Load) -> bool:
+    return bool(load.orbit or load.table or load.placement.moves or load.reacts)
+
+
+def is_planet(m: Mechanics) -> bool:
+    """Whether a fast spin precesses under gravity gradients of orbiting or ephemeris bodies."""
+    if m.attitude is None or not m.turning:
+        return False
+    distant = [x for x in m.turning if _moves(x)]
+    fast = norm(m.scene.context, m.scene.angular_velocity) >= _FAST * source_rate(m.scene)
+    return len(distant) == len(m.turning) and bool(fast) and _turns_about_its_figure(m)
+
+
+def is_nearly_axial(m: Mechanics) -> bool:
+    """Whether a torque-free body or a planet turns nearly, but not exactly, about its figure axis."""
+    if m.carriers or (m.torque and not is_planet(m)):
+        return False
+    scene, pole = m.scene, m.scene.figure.pole
+    wobbles = norm(scene.context, cross(pole, scene.angular_velocity)) != 0
+    return _turns_about_its_figure(m) and (bool(wobbles) or bool(m.torque))
+
+
+# --- the observables ----------------------------------------------------------------------------------------
 
 _AT_REST = "unit vector; NaN where the body is at rest"
 

@@ -34,7 +34,8 @@ from rigidsim.scene.registry import register_observable
 from rigidsim.scene.scene import Scene
 
 
-def _unless(possible: Callable[[Scene], object], why: str) -> Callable[[Scene, str], str | None]:
+def unless(possible: Callable[[Scene], object], why: str) -> Callable[[Scene, str], str | None]:
+    """``Need.missing`` of what only some scenes have, and why others don't."""
     return lambda scene, _: None if possible(scene) else why
 
 
@@ -84,29 +85,29 @@ def _no_attitude(scene: Scene, formulation: str) -> str | None:
     return f'needs the attitude; choose another formulation than "{formulation}", such as "auto"'
 
 
-_NO_POSITION = _unless(
+_NO_POSITION = unless(
     lambda scene: scene.free_flight,
     "the scene has no position; give [initial] position or velocity, or leave it out",
 )
-_NO_POTENTIAL = _unless(
+_NO_POTENTIAL = unless(
     lambda scene: scene.loads or scene.torque_arm is not None or (scene.free_flight and scene.gravity),
     "no load of the scene has a potential that varies; leave it out",
 )
-_NO_VERTICAL = _unless(
+_NO_VERTICAL = unless(
     lambda scene: scene.torque_arm is not None,
     "the scene has no load that marks a vertical; record angular_momentum instead",
 )
-_NO_POINT_MASSES = _unless(
+_NO_POINT_MASSES = unless(
     lambda scene: scene.bodies is not None, "there are no [[bodies]]; add them, or leave it out"
 )
-_NO_ROTORS = _unless(
+_NO_ROTORS = unless(
     lambda scene: scene.tabled.get("rotors"), "there are no [[rotors]]; add them, or leave it out"
 )
-_NO_KERNEL = _unless(
+_NO_KERNEL = unless(
     lambda scene: any(load.sights for load in scene.loads),
     'no load has a source = "..." in an [ephemeris] kernel; give one, or leave it out',
 )
-_NO_SOURCE = _unless(
+_NO_SOURCE = unless(
     lambda scene: first_source(loads_of(scene)) is not None,
     "no load has a source whose direction it would count from (gravity_gradient, central_gravity, or "
     "magnetic_dipole with an orbit); leave it out",

@@ -22,6 +22,7 @@ import heyoka as hy
 
 from rigidsim.model.frames import initial_normal, reference_plane
 from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.observables.axes import is_nearly_axial
 from rigidsim.model.observables.observable import (
     MOMENTUM,
     Angle,
@@ -32,7 +33,6 @@ from rigidsim.model.observables.observable import (
     same_unit,
     told,
 )
-from rigidsim.model.observables.steadiness import is_nearly_axial
 from rigidsim.model.rotations import Symbolic, along, apply, length, unit
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import apply as apply_numbers

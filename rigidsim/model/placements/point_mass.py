@@ -38,7 +38,12 @@ class AmongMasses(Placement):
 
     @property
     def plane(self) -> OrbitPlane:  # type: ignore[override]
-        return OsculatingPlane(self)
+        return OrbitPlane(
+            lambda m: unit(cross(self.away(m), self.velocity(m))),
+            lambda scene: cross([-x for x in self.at_start(scene)], self.velocity_at_start(scene)),
+            "osculating plane of the source's orbit", "normal of the osculating orbit",
+            rate=lambda scene: self.encounter(scene)[1],
+        )  # fmt: skip
 
     def among(self, masses: PointMasses) -> Placement:
         return replace(self, masses=masses)
@@ -130,24 +135,3 @@ class PlacedAsMass(AmongMasses):
         e = min(e + 2 * perturbed, _ALMOST_PARABOLIC)
         doubt = perturbed * motion
         return Circuit(motion, e, closer**-3, doubt, doubt, float(rate))
-
-
-@dataclass(frozen=True)
-class OsculatingPlane(OrbitPlane):
-    """Osculating plane of the body's motion about a moving point mass."""
-
-    source: AmongMasses
-    described = "osculating plane of the source's orbit"
-    called = "normal of the osculating orbit"
-
-    def normal(self, m: Kinematics) -> list[Symbolic]:
-        return unit(cross(self.source.away(m), self.source.velocity(m)))
-
-    def at_start(self, scene: Scene) -> Vector:
-        return cross([-x for x in self.source.at_start(scene)], self.source.velocity_at_start(scene))
-
-    def drift(self, scene: Scene) -> None:
-        return None
-
-    def rate(self, scene: Scene) -> Any:
-        return self.source.encounter(scene)[1]

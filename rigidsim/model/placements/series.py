@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics, seconds
-from rigidsim.model.orbit_planes import EclipticPlane, OrbitPlane
+from rigidsim.model.orbit_planes import OrbitPlane, ecliptic_plane
 from rigidsim.model.placements.placement import Circuit, Placement, SourcePlace
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector
@@ -69,7 +69,7 @@ class PlacedBySeries(Placement):
 
     @property
     def plane(self) -> OrbitPlane | None:  # type: ignore[override]
-        return EclipticPlane() if self.body == "sun" else None
+        return ecliptic_plane() if self.body == "sun" else None
 
     @property
     def without_plane(self) -> str:  # type: ignore[override]
