@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +15,7 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import Observable
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
+from rigidsim.scene.own_states import OwnState
 from rigidsim.scene.registry import OBSERVABLES
 
 
@@ -60,7 +61,7 @@ def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list
     """The variables of the dataset, and all their components; what a scene lacks is refused."""
     recorded: list[Recorded] = []
     outputs: list[Symbolic] = []
-    for observable in [*OBSERVABLES.values(), *own_observables(m)]:
+    for observable in [*OBSERVABLES.values(), *(_of_state(m, state) for state in m.scene.states)]:
         wanted = observable.by_default(m) if record is None else observable.name in record
         if not wanted:
             continue
@@ -82,15 +83,14 @@ def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list
     return recorded, outputs
 
 
-def own_observables(m: Mechanics) -> Iterator[Observable]:
-    """The recorded variable of each user-defined state, which default records have."""
-    for state in m.scene.states:
-        unit = m.scaling.own.get(state.name, 0)
-        yield Observable(
-            state.name, (), state.unit or "1", f"{state.name}, a state of [[states]]",
-            lambda _, name=state.name: [hy.make_vars(name)], lambda _, unit=unit: [unit],
-            attributes=lambda _: {"given_by": "[[states]]"},
-        )  # fmt: skip
+def _of_state(m: Mechanics, state: OwnState) -> Observable:
+    """The recorded variable of a user-defined state, which default records have."""
+    unit = m.scaling.own.get(state.name, 0)
+    return Observable(
+        state.name, (), state.unit or "1", f"{state.name}, a state of [[states]]",
+        lambda _: [hy.make_vars(state.name)], lambda _: [unit],
+        attributes=lambda _: {"given_by": "[[states]]"},
+    )  # fmt: skip
 
 
 _UNIT = "1 by definition: any drift is rounding"
