@@ -1,14 +1,11 @@
 """Formats: their description, their lookup by name, and what they are told of a run besides its numbers."""
 
 import importlib.util
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from fractions import Fraction
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from rigidsim.errors import RigidsimError
 from rigidsim.formats import FORMATS
@@ -54,31 +51,18 @@ def named_epoch(naming: Naming, attributes: Mapping[str, Any]) -> Epoch:
     return epoch or parse_epoch(known)
 
 
-class RunMotion(Protocol):
-    """A run's motion at any time within its span, in double precision."""
-
-    @property
-    def host(self) -> str:
-        """The body that it is; empty if nothing says so."""
-
-    @property
-    def span(self) -> tuple[Fraction, Fraction]:
-        """Times of its first and its last sample, s."""
-
-    def at(self, times: Sequence[Fraction]) -> tuple[np.ndarray, np.ndarray]:
-        """Quaternions (rows, 4), body to space axes, and angular velocities (rows, 3), body axes, rad/s."""
-
-
 @dataclass(frozen=True)
 class TableSource:
-    """The run, or the sweep, that a table comes from; ``motion`` is that of a run, for formats that ask."""
+    """The run, or the sweep, that a table comes from; ``motion`` is a run's, as of
+    ``rigidsim.workflows.again``, for formats that ask.
+    """
 
     title: str
     bits: int
     attributes: dict[str, Any]
     naming: Naming
     angle_unit: AngleUnit | None = None
-    motion: RunMotion | None = None
+    motion: Any = None
 
 
 @dataclass(frozen=True)
@@ -112,8 +96,8 @@ _PLACES = {
     "zarr": ("zarr", "FORMAT", "zarr", "export"),
     "aem": ("ccsds", "AEM", "", ""),
     "oem": ("ccsds", "OEM", "", ""),
-    "ck": ("ck", "CK", "spiceypy", "spice"),
-    "pck": ("pck", "PCK", "spiceypy", "spice"),
+    "ck": ("spice", "CK", "spiceypy", "spice"),
+    "pck": ("spice", "PCK", "spiceypy", "spice"),
 }
 """Module and name of each ``Format``, and a package that it needs besides rigidsim's own requirements, with
 the extra that brings it.
