@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 
 from rigidsim.errors import RigidsimError
-from rigidsim.formats.attitude_messages import MESSAGE_COLUMNS, message_columns
+from rigidsim.formats.messages import MESSAGE_COLUMNS, message_columns
 from rigidsim.scene.epochs import Epoch, parse_epoch
 from rigidsim.scene.row_rotations import conjugated, multiplied, turned
 from rigidsim.scene.space_axes import ECLIPTIC, SpaceAxes, from_equator

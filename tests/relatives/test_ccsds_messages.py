@@ -421,10 +421,10 @@ def changed(old: str, new: str) -> Callable[[str], str]:
 
 
 WRONG = {
-    "no direction": (changed("ATTITUDE_DIR = A2B\n", ""), "line 2: ATTITUDE_DIR is missing, by"),
+    "no direction": (changed("ATTITUDE_DIR = A2B\n", ""), "line 2: ATTITUDE_DIR is missing; allowed: A2B"),
     "a direction in version 2": (
         lambda text: text.replace("VERS = 1.0", "VERS = 2.0").replace("A2B", "B2A"),
-        r"line 2: ATTITUDE_DIR = B2A, which version 2 doesn't know; swap",
+        "line 2: ATTITUDE_DIR = B2A; allowed: A2B",
     ),
     "the scalar's place": (changed("QUATERNION_TYPE = LAST\n", ""), "line 2: QUATERNION_TYPE is missing"),
     "two frames of space": (changed("= SC_BODY_1", "= ICRF"), "one frame of space and one of the body"),
@@ -444,6 +444,7 @@ WRONG = {
         lambda text: text + text[text.index("META_START") :].replace("EME2000", "LVLH"),
         "segments in different frames, EME2000, LVLH",
     ),
+    "torn XML": (lambda text: "<aem>" + text, "is no XML"),
     "no rows": (lambda text: text[: text.index("2024-061")], "holds no data lines"),
 }  # fmt: skip
 PLAIN = """CCSDS_AEM_VERS = 1.0

@@ -18,7 +18,7 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.formats import ck_reading
-from rigidsim.formats.attitude_messages import MESSAGE_COLUMNS
+from rigidsim.formats.messages import MESSAGE_COLUMNS
 from rigidsim.formats.trajectories import Trajectory, config_unit, read_columns
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.names import written
