@@ -108,8 +108,8 @@ class SpiceRun:
         places = np.unique(np.linspace(0, table.rows - 1, _CHECKED).astype(int)).tolist()
         times = {row: self._time(row) for row in places}
         self._known = {x: t for x, t in times.items() if self.motion.span[0] <= t <= self.motion.span[1]}
-        rates = table.dataset.get("angular_velocity")
-        rates = self.at([self.first])[1] if rates is None else rates.values
+        known = table.dataset.get("angular_velocity")
+        rates = self.at([self.first])[1] if known is None else known.values
         self.fastest = float(np.linalg.norm(rates, axis=1).max())
         whole = (self.ahead / self.spacing).denominator == 1  # else times, doubles too, may be off SPICE's
         self.floor = (

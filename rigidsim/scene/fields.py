@@ -238,6 +238,7 @@ def _directed(value: list[ExactNumber]) -> list[ExactNumber]:
 
 
 Dimensionless = Annotated[ExactNumber, InUnit("1")]
+Eccentricity = Annotated[Dimensionless, Range(lambda x: 0 <= x < 1, "0 (a circle) to below 1")]
 Metre = Annotated[ExactNumber, InUnit("m")]
 Kilogram = Annotated[ExactNumber, InUnit("kg")]
 Second = Annotated[ExactNumber, InUnit("s")]

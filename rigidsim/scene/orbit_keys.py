@@ -7,7 +7,18 @@ from typing import ClassVar
 from pydantic import Field, StrictStr
 
 from rigidsim.scene.exact import ZERO
-from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Rule, Second, one_of
+from rigidsim.scene.fields import (
+    Angle,
+    ConfigTable,
+    Eccentricity,
+    Metre,
+    Positive,
+    Rate,
+    Rule,
+    Second,
+    excludes,
+    one_of,
+)
 from rigidsim.scene.registry import LoadFields
 
 PACES = ("period", "sidereal_period", "longitude_rate")
@@ -28,12 +39,16 @@ class Elements(ConfigTable):
 
     key: ClassVar[str]
     opposite: ClassVar[bool] = False
+    rules: ClassVar[tuple[Rule, ...]] = (
+        one_of(*PACES, least=0),
+        excludes("table", "node_rate", "periapsis_rate"),
+    )
 
     table: StrictStr | None = Field(None, examples=["mars_elements.csv"])
     """name of a CSV file next to the config, with elements over time"""
-    semi_major_axis: Metre | None = Field(None, examples=["7000 km"])
+    semi_major_axis: Positive[Metre] | None = Field(None, examples=["7000 km"])
     """semi-major axis of the ellipse"""
-    eccentricity: Dimensionless = ZERO
+    eccentricity: Eccentricity = ZERO
     """0 to below 1"""
     inclination: Angle = Field(ZERO, examples=["51.6 deg"])
     """inclination to the XY plane of the space axes"""
@@ -47,15 +62,15 @@ class Elements(ConfigTable):
     """rate of the ascending node"""
     periapsis_rate: Rate = ZERO
     """rate of the argument of periapsis"""
-    period: Second | None = Field(None, examples=["27.55455 day"])
+    period: Positive[Second] | None = Field(None, examples=["27.55455 day"])
     """anomalistic period, from periapsis to periapsis, of the mean anomaly (with a table without one, of the
     mean longitude); by default by Kepler's third law
     """
-    sidereal_period: Second | None = Field(None, examples=["27.321661 day"])
+    sidereal_period: Positive[Second] | None = Field(None, examples=["27.321661 day"])
     """period of the mean longitude (node + periapsis + mean anomaly), such as a sidereal month or year,
     instead of period
     """
-    longitude_rate: Rate | None = Field(None, examples=["13.17639648 deg/day"])
+    longitude_rate: Positive[Rate] | None = Field(None, examples=["13.17639648 deg/day"])
     """rate of the mean longitude (node + periapsis + mean anomaly), instead of period"""
 
 
@@ -63,6 +78,7 @@ class Orbit(Elements):
     """Where the attracting body is, as seen from the body: by a Kepler orbit, or as one of [[bodies]]."""
 
     key = "orbit"
+    rules = (*Elements.rules, excludes("body", *Elements.model_fields))
 
     body: StrictStr | None = Field(None, examples=["sun"])
     """name of the attracting point mass in [[bodies]]; excludes all other keys"""

@@ -13,7 +13,6 @@ from rigidsim.scene.kepler import combined, plane_vectors
 from rigidsim.scene.orbit_keys import PACES, Elements, Orbit
 from rigidsim.scene.orbit_tables.elements import read_table
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
-from rigidsim.scene.point_masses import ellipse_of
 from rigidsim.scene.registry import Setting
 from rigidsim.scene.text_tables import TableError
 from rigidsim.scene.tracing.arithmetic import TracedExact
@@ -86,9 +85,6 @@ class KeplerOrbit:
 
 def attracting_body(orbit: Orbit, around: Setting) -> int:
     """Index of the point mass that an orbit names."""
-    more = sorted(orbit.model_fields_set - {"body"})
-    if more:
-        raise around.fault(f"orbit.{more[0]}", "given with body, whose motion is integrated; remove it")
     masses = around.bodies
     names = () if masses is None else masses.names
     if masses is None or orbit.body not in names:
@@ -101,17 +97,10 @@ def attracting_body(orbit: Orbit, around: Setting) -> int:
     return found
 
 
-def pace_of(table: Elements, around: Setting) -> tuple[str, ExactNumber] | None:
+def pace_of(table: Elements) -> tuple[str, ExactNumber] | None:
     """The key that replaces the mean motion of Kepler's third law, and its value; None if none is given."""
-    given = [(key, getattr(table, key)) for key in PACES if getattr(table, key) is not None]
-    for key, value in given:
-        if value.sign <= 0:
-            what = "rate" if key == "longitude_rate" else "time"
-            raise around.fault(f"{table.key}.{key}", f"given {float(value):g}; a positive {what} is allowed")
-    if len(given) > 1:
-        what = f"given with {given[0][0]}; at most one of {', '.join(PACES)} is allowed"
-        raise around.fault(f"{table.key}.{given[1][0]}", what)
-    return given[0] if given else None
+    given = ((key, getattr(table, key)) for key in PACES)
+    return next(((key, value) for key, value in given if value is not None), None)
 
 
 def rate_of(pace: tuple[str, ExactNumber], context: Any) -> Any:
@@ -125,7 +114,7 @@ def mean_motion(table: Elements, strength: Any | None, around: Setting) -> Any:
     gravitational parameter ``strength`` is known. Mean longitude is ascending node + periapsis + mean
     anomaly.
     """
-    context, pace = around.context, pace_of(table, around)
+    context, pace = around.context, pace_of(table)
     if pace is None:
         if strength is None:
             what = "missing; give it, or gravitational_parameter for the one of Kepler's third law"
@@ -149,9 +138,7 @@ def resolve_orbit(table: Elements, strength: Any | None, around: Setting) -> Kep
     context = around.context
     if table.semi_major_axis is None:
         raise around.fault(f"{table.key}.semi_major_axis", "missing; it is needed")
-    axis, eccentricity = ellipse_of(
-        table, context, lambda key, text: around.fault(f"{table.key}.{key}", text)
-    )
+    axis, eccentricity = table.semi_major_axis.at(context), table.eccentricity.at(context)
     motion = mean_motion(table, strength, around)
     node, node_rate = table.ascending_node.at(context), table.node_rate.at(context)
     periapsis, periapsis_rate = table.periapsis.at(context), table.periapsis_rate.at(context)
@@ -211,23 +198,13 @@ def tabulated_orbit(
     return orbit
 
 
-_NO_CONSTANTS = ("table", "node_rate", "periapsis_rate")
-
-
 def resolve_tabulated_orbit(fields: Elements, strength: Any | None, around: Setting) -> TabulatedOrbit:
     """Work out a table's orbit; ``strength`` is the gravitational parameter of Kepler's law, if known."""
     name = fields.table
     assert name is not None
-    given = [
-        (key, getattr(fields, key)) for key in sorted(fields.model_fields_set) if key not in _NO_CONSTANTS
-    ]
+    given = [(key, getattr(fields, key)) for key in sorted(fields.model_fields_set - {"table"})]
     if isinstance(strength, Traced) or any(isinstance(value, TracedExact) for _, value in given):
         raise Untraceable("an orbit by a table depends on it")
-    for rate in ("node_rate", "periapsis_rate"):
-        if getattr(fields, rate).sign != 0:
-            what = "given with table, whose columns determine what moves; remove it"
-            raise around.fault(f"{fields.key}.{rate}", what)
-    pace_of(fields, around)
     if name not in around.config.texts:
         known = ", ".join(around.config.texts) or "none"
         what = f'given "{name}", but this config was given as text, without files next to it; put the '

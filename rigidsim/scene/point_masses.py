@@ -1,8 +1,8 @@
 """``[[bodies]]``: point masses under mutual gravity, as keys and with every number worked out."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from pydantic import Field, StrictBool, StrictStr
 
@@ -12,12 +12,15 @@ from rigidsim.scene.exact import ZERO, ExactNumber
 from rigidsim.scene.fields import (
     Angle,
     ConfigTable,
-    Dimensionless,
+    Eccentricity,
     GravitationalParameter,
     Metre,
+    Positive,
+    Rule,
     Speed,
     Triple,
     VariableName,
+    excludes,
 )
 from rigidsim.scene.kepler import combined, plane_vectors
 from rigidsim.scene.kernels.ephemeris import Ephemeris
@@ -38,9 +41,9 @@ class StartingOrbit(ConfigTable):
 
     about: StrictStr = Field(examples=["sun"])
     """name of the point mass to which the elements are relative"""
-    semi_major_axis: Metre = Field(examples=["1 au"])
+    semi_major_axis: Positive[Metre] = Field(examples=["1 au"])
     """semi-major axis of the ellipse"""
-    eccentricity: Dimensionless = ZERO
+    eccentricity: Eccentricity = ZERO
     """0 to below 1"""
     inclination: Angle = ZERO
     """inclination to the XY plane of the space axes"""
@@ -52,12 +55,22 @@ class StartingOrbit(ConfigTable):
     """mean anomaly at the start"""
 
 
+_BY_KERNEL = excludes("ephemeris", "position", "velocity", "orbit")
+
+
 class PointMassBody(ConfigTable):
     """A point mass under the gravity of all others."""
 
+    rules: ClassVar[tuple[Rule, ...]] = (
+        excludes("orbit", "position", "velocity"),
+        lambda table: (
+            excludes("ephemeris", "position", "velocity", "orbit")(table) if table.ephemeris else ""
+        ),
+    )
+
     name: VariableName = Field(examples=["sun"])
     """letters, digits and underscores, beginning with a letter"""
-    gravitational_parameter: GravitationalParameter | None = Field(
+    gravitational_parameter: Positive[GravitationalParameter] | None = Field(
         None, examples=["1.32712440018e20 m^3/s^2"]
     )
     """G M; with ephemeris = true a package's own by default"""
@@ -167,10 +180,6 @@ def resolve_point_masses(
     at_host = _host(host, names, free_flight)
     full = coupling == "full"
     strengths = [_strength(number, table, context, ephemeris) for number, table in enumerate(tables)]
-    for number, strength in enumerate(strengths):
-        if not strength > 0:
-            what = f"given {context.nstr(strength, 8)}; a positive number is allowed"
-            raise _fault(number, "gravitational_parameter", what)
     if full and mass is None:
         what = 'missing; coupling = "full" needs it, since the bodies feel the forces of this one'
         raise ConfigError(Problem("[body] mass", what))
@@ -180,8 +189,15 @@ def resolve_point_masses(
             what = f"given {context.nstr(mass, 6)} kg, but the gravitational parameter of its host "
             what += f'"{names[at_host]}" makes it {context.nstr(expected, 6)} kg; correct one of them'
             raise ConfigError(Problem("[body] mass", what))
-    _refuse_overlap(tables)
-    places = {n: _of_kernel(n, x, context, ephemeris) for n, x in enumerate(tables) if x.ephemeris}
+    placed = {table.name for table in tables if table.ephemeris}
+    if "earth_moon_barycenter" in placed and placed & {"earth", "moon"}:
+        what = 'given "earth_moon_barycenter", whose mass contains "earth" and "moon"; remove one of them'
+        raise _fault(names.index("earth_moon_barycenter"), "name", what)
+    places = {
+        number: _kernel(number, ephemeris).start_of(table.name, context)
+        for number, table in enumerate(tables)
+        if table.ephemeris
+    }
     for number in range(len(tables)):
         _place(number, tables, names, strengths, context, places, ())
     positions = [places[n][0] for n in range(len(tables))]
@@ -195,41 +211,22 @@ def resolve_point_masses(
     return PointMasses(tuple(names), strengths, tuple(positions), tuple(velocities), at_host, full)
 
 
-def _refuse_overlap(tables: Sequence[PointMassBody]) -> None:
-    """Refuse the Earth and the Moon together beside one of them."""
-    placed = {table.name: number for number, table in enumerate(tables) if table.ephemeris}
-    for name in ("earth", "moon"):
-        if name in placed and "earth_moon_barycenter" in placed:
-            what = (
-                f'given "earth_moon_barycenter", whose mass contains the mass of "{name}"; remove one of them'
-            )
-            raise _fault(placed["earth_moon_barycenter"], "name", what)
+def _kernel(number: int, ephemeris: Ephemeris | None) -> Ephemeris:
+    if ephemeris is None:
+        raise _fault(number, "ephemeris", "given true, but there is no [ephemeris]; add one with a kernel")
+    return ephemeris
 
 
 def _strength(number: int, table: PointMassBody, context: Any, ephemeris: Ephemeris | None) -> Any:
-    if table.gravitational_parameter is not None:
-        return table.gravitational_parameter.at(context)
-    found = None
-    if table.ephemeris and ephemeris is not None:
-        ephemeris.check_body(table.name, lambda what: _fault(number, "name", what))
-        found = ephemeris.kernel.strength(table.name)
-    if found is None and table.ephemeris and ephemeris is not None:
-        raise _fault(number, "gravitational_parameter", f"missing; {ephemeris.kernel.name} has none: give it")
-    if found is None and not table.ephemeris:
+    given = table.gravitational_parameter
+    if table.ephemeris:
+        there = _kernel(number, ephemeris)
+        there.check_body(table.name, lambda what: _fault(number, "name", what))
+        known = there.kernel.strength(table.name)
+        given = ExactNumber(known) if given is None and known else given
+    if given is None:
         raise _fault(number, "gravitational_parameter", "missing; it is needed")
-    return context.one if found is None else ExactNumber(found).at(context)
-
-
-def _of_kernel(
-    number: int, table: PointMassBody, context: Any, ephemeris: Ephemeris | None
-) -> tuple[Vector, Vector]:
-    """Where the kernel has a body at the start, and its velocity, from the barycentre."""
-    for key in ("position", "velocity", "orbit"):
-        if getattr(table, key) is not None:
-            raise _fault(number, key, "given with ephemeris = true, which determines it; remove one of them")
-    if ephemeris is None:
-        raise _fault(number, "ephemeris", "given true, but there is no [ephemeris]; add one with a kernel")
-    return ephemeris.start_of(table.name, context)
+    return given.at(context)
 
 
 def _host(host: str | None, names: Sequence[str], free_flight: bool) -> int | None:
@@ -267,8 +264,6 @@ def _place(
         place = [x.at(context) for x in table.position] if table.position else list(zero)
         moving = [x.at(context) for x in table.velocity] if table.velocity else list(zero)
     else:
-        if table.position is not None or table.velocity is not None:
-            raise _fault(number, "orbit", "given with position or velocity; remove one of them")
         about = table.orbit.about
         others = [name for name in names if name != table.name]
         if about not in others:
@@ -278,32 +273,22 @@ def _place(
         if centre in asking:
             raise _fault(number, "orbit.about", f'given "{about}", which goes about this body itself')
         r, v = _place(centre, tables, names, strengths, context, places, (*asking, number))
-        x, u = _of_elements(number, table.orbit, strengths[centre] + strengths[number], context)
+        x, u = _of_elements(table.orbit, strengths[centre] + strengths[number], context)
         place = [a + b for a, b in zip(r, x, strict=True)]
         moving = [a + b for a, b in zip(v, u, strict=True)]
     places[number] = place, moving
     return places[number]
 
 
-def _of_elements(number: int, orbit: StartingOrbit, strength: Any, context: Any) -> tuple[Vector, Vector]:
+def _of_elements(orbit: StartingOrbit, strength: Any, context: Any) -> tuple[Vector, Vector]:
     """Relative position and velocity."""
-    a, e = ellipse_of(orbit, context, lambda key, text: _fault(number, f"orbit.{key}", text))
+    a, e = orbit.semi_major_axis.at(context), orbit.eccentricity.at(context)
     anomaly = eccentric_anomaly(context, orbit.mean_anomaly.at(context), e)
     c, s, root = context.cos(anomaly), context.sin(anomaly), context.sqrt(1 - e * e)
     angles = (x.at(context) for x in (orbit.inclination, orbit.ascending_node, orbit.periapsis))
     axes = plane_vectors(*((context.cos(x), context.sin(x)) for x in angles))
     speed = context.sqrt(strength / a) / (1 - e * c)
     return combined(axes, a * (c - e), a * root * s), combined(axes, -(speed * s), speed * root * c)
-
-
-def ellipse_of(orbit: Any, context: Any, fault: Callable[[str, str], ConfigError]) -> tuple[Any, Any]:
-    """Semi-major axis (m) and eccentricity of a table (mpf), which describe an ellipse."""
-    a, e = orbit.semi_major_axis.at(context), orbit.eccentricity.at(context)
-    if not a > 0:
-        raise fault("semi_major_axis", f"given {context.nstr(a, 8)} m; a positive length is allowed")
-    if not 0 <= e < 1:
-        raise fault("eccentricity", f"given {context.nstr(e, 8)}; 0 (a circle) to below 1 is allowed")
-    return a, e
 
 
 def _about_barycentre(vectors: Sequence[Vector], strengths: Vector) -> list[Vector]:

@@ -98,7 +98,7 @@ def test_what_point_masses_leave_out() -> None:
     [
         (SCENE, "initial.position=; initial.velocity=", "for a body without a position"),
         (SCENE, "loads[1].position=[1, 0, 0]", "given source and position; give one of them"),
-        (SYSTEM, "bodies[0].position=[1, 0, 0]", "given with ephemeris = true, which determines it"),
+        (SYSTEM, "bodies[0].position=[1, 0, 0]", "given position with ephemeris, which determines it"),
     ],
 )
 def test_mistakes_are_refused(text: str, setting: str, words: str) -> None:

@@ -79,7 +79,10 @@ REFUSED = {
         "has no column semi_major_axis; add one, or give semi_major_axis with table",
     ),
     "too short": (with_table(rows(every=7.0)), "but the run goes from 0.0 s to 5184000.0 s"),
-    "a rate": (with_table(rows(), ', node_rate = "1 deg/day"'), "whose columns determine what moves"),
+    "a rate": (
+        with_table(rows(), ', node_rate = "1 deg/day"'),
+        "given node_rate with table, which",
+    ),
     "turns": (with_table(rows(shift=-95.0)), "whole turns can't be counted"),
     "hyperbola": (with_table(rows().replace("0.02", "1.02")), "row 1: eccentricity is out of range"),
 }
@@ -90,7 +93,7 @@ def test_an_orbit_that_no_table_gives(which: str) -> None:
     text, says = REFUSED[which]
     with pytest.raises(ConfigError) as caught:
         build_scene(parse(text))
-    assert "[[loads]] number 1 orbit." in str(caught.value)
+    assert "[[loads]] number 1 orbit" in str(caught.value)
     assert says in str(caught.value)
 
 

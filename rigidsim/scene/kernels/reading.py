@@ -21,6 +21,7 @@ from functools import lru_cache
 from importlib import import_module
 from itertools import islice
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -47,7 +48,7 @@ _BARYCENTER = "earth_moon_barycenter"
 _FRAME = 1  # of SPICE: J2000, which DE kernels since DE403 identify with the ICRF
 _TYPES = (2, 3)
 _IDENTIFIERS = (b"DAF/SPK", b"NAIF/DAF")  # of SPK files today, and before 1997
-_UNREADABLE = (OSError, ValueError, LookupError, ArithmeticError, EOFError, struct.error)
+_UNREADABLE = (OSError, ValueError, LookupError, ArithmeticError, EOFError, TokenError, struct.error)
 """What the numbers of a file that isn't what it should be lead to."""
 
 
