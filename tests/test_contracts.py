@@ -116,7 +116,7 @@ CASES = [(name, precision, "quaternion") for precision in ("double", *EPSILON) f
 CASES += [(name, "double", given) for name in MAIN for given in ("rotation_matrix", "euler_angles")]
 CASES += [("top", "double", "canonical"), ("pendulum", "double", "planar"), ("damped", "double", "rates")]
 CASES = list(dict.fromkeys(CASES))
-USUAL = [("satellite", "extended", "quaternion"), ("spinner", "double", "euler_angles")]
+USUAL = [("satellite", "extended", "quaternion"), ("top", "double", "euler_angles")]
 USUAL += [("pendulum", "double", "planar")]
 FORMULATED = {name for name in FORMULATIONS if name != "rodrigues"}  # which tests of extensions register
 EXACT = {"single": "double", "double": "extended", "extended": "quadruple"}

@@ -54,7 +54,7 @@ def torque(load: dict[str, Any], arm: np.ndarray, r: np.ndarray) -> np.ndarray:
     return 3 / np.linalg.norm(place) ** 3 * r @ np.cross(c, np.array([1, 1.7, 2]) * c)
 
 
-@pytest.mark.parametrize("seed", seeds(3, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_what_is_kept_is_found(seed: int) -> None:
     draw = np.random.default_rng(seed)
     for _ in range(SCENES):

@@ -49,11 +49,11 @@ KEYS = [
 ]
 
 
-@pytest.mark.parametrize("seed", seeds(3, 50))
+@pytest.mark.parametrize("seed", seeds(1, 50))
 def test_members_beyond_the_range_of_a_key_are_refused(seed: int, tmp_path: Path) -> None:
     chance = random.Random(seed)
     key, allowed, ends = chance.choice(KEYS)
-    values = [chance.uniform(*ends) for _ in range(12)]
+    values = [chance.uniform(*ends) for _ in range(6)]
     first = next(v for v in iter(lambda: chance.uniform(*ends), None) if allowed(v))
     values.insert(0, first)
     text = f'{SCENE}axes."{key}" = {{values = {values}, name = "drawn"}}\n'

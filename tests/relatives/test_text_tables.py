@@ -88,7 +88,7 @@ def test_a_fit_reads_any_style(seed: int, tmp_path: Path) -> None:
     assert found.parameters[0].value == pytest.approx(np.mean(rate["z"]), abs=1e-9), text
 
 
-@pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_sample_times_of_any_style(seed: int, tmp_path: Path) -> None:
     """Each is the number that is written, digit by digit; dates need a time scale here."""
     chance = random.Random(seed)

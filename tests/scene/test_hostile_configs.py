@@ -51,7 +51,7 @@ def test_absurd_sizes_are_refused_before_anything_is_allocated(key: str) -> None
 
 BOMBS = {
     "a deep array": "x = " + "[" * 5000 + "]" * 5000,
-    "a million keys": "\n".join(f"k{i} = 1" for i in range(100_000)),
+    "many keys": "\n".join(f"k{i} = 1" for i in range(20_000)),
     "a tower of powers": BASE.replace("end = 10", 'end = "9^9^9^9^9"'),
     "a null byte": BASE + "\x00",
     "an escape sequence": BASE.replace("[body]", '[body]\n"\\u001b[31m" = 1'),

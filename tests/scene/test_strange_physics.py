@@ -167,7 +167,7 @@ def test_no_code_of_a_package_is_run(tmp_path: Path) -> None:
     (tmp_path / "moon.toml").write_text(moon(time='end = "1 day"'))
     places = [str(tmp_path), str(Path(__file__).parents[2])]
     found = subprocess.run(
-        [sys.executable, "-m", "rigidsim", "plan", "moon.toml"],
+        [sys.executable, "-m", "rigidsim", "check", "moon.toml"],
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(places)},
         capture_output=True,

@@ -19,7 +19,10 @@ DRIVEN = (
 )
 
 
-@pytest.mark.parametrize("formulation", ["quaternion", "rotation_matrix", "euler_angles", "closed_form"])
+@pytest.mark.parametrize(
+    "formulation",
+    cases(["quaternion", "rotation_matrix", "euler_angles", "closed_form"], ["euler_angles", "closed_form"]),
+)
 def test_the_same_motion_is_found_from_its_other_end(formulation: str) -> None:
     """Forwards from the state at -3 s in 80 bits, and backwards from the state at 0 in double precision."""
     how = f'integrator.formulation="{formulation}"'
@@ -44,7 +47,7 @@ def test_the_same_motion_is_found_from_its_other_end(formulation: str) -> None:
     "name",
     cases(
         [path.stem for path in CONFIGS],
-        ["satellite_libration", "earth_precession_averaged", "moon_cassini_state", "pointing_law"],
+        ["satellite_libration", "earth_precession_averaged"],
         daily=2,
     ),
 )
@@ -62,7 +65,7 @@ def test_ready_scenes_come_back_to_their_start(name: str) -> None:
     assert not found.beyond
 
 
-@pytest.mark.parametrize("case", cases(CASES, [("spinner", "double", "euler_angles")], daily=2), ids="-".join)
+@pytest.mark.parametrize("case", cases(CASES, [("top", "double", "euler_angles")], daily=2), ids="-".join)
 def test_a_run_that_was_stopped_has_the_same_bits(case: tuple[str, str, str], tmp_path: Path) -> None:
     text = SCENES[case[0]].replace("end = 12", "end = -4")
     given = settings(*case[1:])

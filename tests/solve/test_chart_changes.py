@@ -44,7 +44,7 @@ def attitude_from(sequence: str, angles: np.ndarray) -> np.ndarray:
     return result
 
 
-@pytest.mark.parametrize("sequence", cases(EULER_SEQUENCES, ("zxz", "xyz")))
+@pytest.mark.parametrize("sequence", cases(EULER_SEQUENCES, ["xyz"]))
 def test_a_tumbling_body_keeps_its_attitude_in_each_sequence(sequence: str) -> None:
     text = tumbling(sequence)
     exact = run_text(text, 'name="x"', RECORD, 'integrator.precision="extended"')

@@ -149,11 +149,6 @@ def test_each_side_integrates_by_itself(torque: str, rate: float) -> None:
             "euler_angles = [1, 1, 0.5]\nangular_velocity = [0, 0, 0.3]",
             "almost no time",
         ),
-        (
-            "-0.4*sign(psi) - 0.2*sign(wz)",
-            "euler_angles = [1, 1, 0]\nangular_velocity = [0, 0, 0]",
-            "almost no time",
-        ),
     ],
 )
 def test_what_cannot_be_continued_ends_in_a_status_of_its_own(torque: str, initial: str, why: str) -> None:

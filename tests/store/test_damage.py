@@ -84,7 +84,7 @@ SAYS = {
 }
 
 
-@pytest.mark.parametrize("kind", cases(DAMAGES, ["torn", "lost"]))
+@pytest.mark.parametrize("kind", cases(DAMAGES, ["torn"]))
 def test_a_damaged_segment(kind: str, originals: dict[str, rigidsim.Run], tmp_path: Path) -> None:
     folder = shutil.copytree(originals["begun"].folder.path, tmp_path / "d")
     damage: Callable[[Path, Path], None] = DAMAGES[kind]
