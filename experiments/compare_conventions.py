@@ -29,7 +29,7 @@ from scipy.spatial.transform import Rotation
 
 import rigidsim
 from experiments.common import Command
-from rigidsim.workflows.compare.result import Comparison
+from rigidsim.workflows.compare.compared import Comparison
 
 SEQUENCES = ["zxz", "zyz", "xyx", "xzx", "yxy", "yzy", "zyx", "xyz", "xzy", "yxz", "yzx", "zxy"]
 QUATERNIONS = [

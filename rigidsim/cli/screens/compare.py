@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.scene.readable import span_text
-from rigidsim.workflows.compare.result import AGREES, UNDECIDED, Comparison
+from rigidsim.workflows.compare.compared import Comparison
+from rigidsim.workflows.compare.evidence import AGREES, UNDECIDED
 
 _MOST_UNDECIDED = 6
 

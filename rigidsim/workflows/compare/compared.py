@@ -3,34 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
+from pydantic import PrivateAttr
 
 from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.scene import Scene, build_scene
-from rigidsim.solve.from_states import FromStates, NotFromStates
 from rigidsim.store.outputs import refuse_loss, writing
 from rigidsim.store.run import Run
+from rigidsim.store.summary_parts import SummaryPart
 from rigidsim.workflows.compare.as_run import dataset_of_rows, files_of, trajectory_given
 from rigidsim.workflows.compare.columns import LEAST_ROWS, Attitudes, attitudes_of, size_of
 from rigidsim.workflows.compare.conventions import Convention, find_convention
-from rigidsim.workflows.compare.evidence import Evidence
-from rigidsim.workflows.compare.result import (
-    INTEGRATION_ERROR,
-    AttitudeError,
-    Comparison,
-    Disagreement,
-    LocalDefects,
-    TrajectoryDrift,
-    thinned,
-)
-from rigidsim.workflows.compare.verdict import judged, rms, unexplained_share
+from rigidsim.workflows.compare.defects import rms
+from rigidsim.workflows.compare.evidence import INTEGRATION_ERROR, Evidence, judged
 from rigidsim.workflows.read import Given, as_experiment, refuse_backwards
 from rigidsim.workflows.run import run
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 WITHIN = 1e-9
 """Largest angle (rad) between attitudes that agree, if nothing else is asked for."""
@@ -38,6 +34,144 @@ FIGURES = (".png", ".svg")
 _ENDINGS = {"figure_file": FIGURES, "timeline_file": (".rrd",)}
 _FAR_AWAY = 10.0  # spans of the file or of the experiment, beyond which times are counted from another zero
 _MOST_SHOWN = 20_000  # rows of a timeline
+_MOST_DRAWN = 4000  # points of a figure
+
+
+class AttitudeError(SummaryPart):
+    """Angle between the trajectory's attitudes and the experiment's, rad, over all rows.
+
+    ``time``: of the largest one, s; ``row``: as the file counts it.
+    """
+
+    largest: float
+    rms: float
+    time: float
+    row: str
+
+
+class TrajectoryDrift(SummaryPart):
+    """Largest drift of an invariant by the trajectory's own numbers, relative to ``rigidsim``'s scale."""
+
+    name: str
+    largest: float
+    final: float
+
+
+class LocalDefects(SummaryPart):
+    """What the experiment's equations miss from rows to the next ones.
+
+    Attributes:
+        largest: angle, rad; rms: the same in the mean; time: of the largest, s.
+        rate_largest: rad/s; None without rates in the trajectory.
+        rows: number of rows that were started from.
+        window_s: length of the windows that models are told from integrators by.
+        unexplained: of the windows' attitude defects, rms of what differences of the rates don't explain
+            over rms of what they do; without rates of what no added acceleration explains over all.
+        missing_acceleration: rms, rad/s^2, that would explain the rates' defects, or the attitude's where
+            the trajectory has no rates.
+        order: of the tool's method, and step_tolerance: rad, that errors of its steps are held to, if rows
+            are its steps; None where they don't show.
+    """
+
+    largest: float
+    rms: float
+    time: float
+    rate_largest: float | None
+    rows: int
+    window_s: float | None
+    unexplained: float | None
+    missing_acceleration: float | None
+    order: float | None = None
+    step_tolerance: float | None = None
+
+
+class Disagreement(SummaryPart):
+    """The first row that is further from the experiment than ``within``."""
+
+    time: float
+    row: str
+
+
+class Comparison(SummaryPart):
+    """A trajectory of another tool beside an experiment.
+
+    Attributes:
+        verdict: agrees, integration_error, wrong_model, inconsistent_rates or undecided.
+        why: the verdict in words, with the numbers that it was given for.
+        within: rad, what attitudes may differ by and agree.
+        resolution: rad, of the trajectory's attitudes by the digits that they are written in.
+        rate_error: largest difference of angular velocities, rad/s; None without rates.
+        position_error: the same of positions, m.
+        told: what a user should know besides.
+        dataset_file, figure_file, timeline_file: where they were written; empty if nowhere.
+    """
+
+    name: str
+    source: str
+    rows: int
+    span_s: float
+    verdict: str
+    why: str
+    within: float
+    resolution: float
+    attitude_error: AttitudeError
+    rate_error: float | None
+    position_error: float | None
+    convention: Convention
+    drifts: list[TrajectoryDrift]
+    local_defects: LocalDefects | None
+    first_disagreement: Disagreement | None
+    told: list[str]
+    dataset_file: str = ""
+    figure_file: str = ""
+    timeline_file: str = ""
+
+    _dataset: Any = PrivateAttr(default=None)
+
+    @property
+    def dataset(self) -> xarray.Dataset:
+        """Attitude error, drifts and defects along time, with their units."""
+        found: xarray.Dataset = self._dataset
+        return found
+
+    def plot(self) -> Figure:
+        """Attitude error, drifts and local defects along time."""
+        from rigidsim.look.figures.compared import compared_figure
+
+        return compared_figure(thinned(self.dataset))
+
+    def save(self, path: str | Path) -> Path:
+        """Write the dataset (netCDF-4/HDF5)."""
+        with writing(Path(path)) as temporary:
+            self.dataset.to_netcdf(temporary, engine="h5netcdf")
+        return Path(path)
+
+    def __repr__(self) -> str:
+        error = self.attitude_error
+        return (
+            f"<Comparison of {self.source} with {self.name!r}: {self.verdict}, attitude error "
+            f"{error.largest:.3g} rad at {error.time:.6g} s ({error.rms:.3g} rms)>"
+        )
+
+    __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        rows = [
+            ("verdict", self.verdict),
+            ("why", self.why),
+            ("attitude error", f"{self.attitude_error.largest:.4g} rad"),
+        ]
+        rows += [(f"drift of {x.name}", f"{x.largest:.3g}") for x in self.drifts]
+        cells = "".join(f"<tr><th>{escape(a)}</th><td>{escape(b)}</td></tr>" for a, b in rows)
+        return f"<table>{cells}</table>"
+
+
+def thinned(dataset: xarray.Dataset) -> xarray.Dataset:
+    """A comparison's dataset with, of very many rows, the largest of each stretch, as a figure shows them."""
+    stretch = -(-dataset.sizes["time"] // _MOST_DRAWN)
+    return (
+        dataset if stretch == 1 else abs(dataset).coarsen(time=stretch, boundary="pad").max(keep_attrs=True)
+    )
 
 
 def compare(
@@ -87,12 +221,7 @@ def compare(
     given = given.at(slice(own.sizes["time"]))
     motion = own["quaternion"].values, own["angular_velocity"].values
     found, more = find_convention(given, convention or {}, motion)
-    seen = Evidence(given, found, own, uncertainty, within, told + more)
-    try:
-        seen.begin_from(FromStates(scene))
-    except NotFromStates as error:
-        seen.why_not = str(error)
-        seen.told.append(f"neither local defects nor drifts were measured: {error}")
+    seen = Evidence(given, found, own, uncertainty, within, told + more, scene)
     result = _result(seen, asked.config.name, {name: str(path) for name, path in paths.items()})
     if out is not None:
         result.save(out)
@@ -249,7 +378,7 @@ def _local_defects(seen: Evidence, verdict: str) -> tuple[LocalDefects | None, d
     at = int(np.nanargmax(sizes)) if np.isfinite(sizes).any() else 0
     share = acceleration = order = tolerance = None
     if windows is not None:
-        share, acceleration = unexplained_share(windows), rms(np.linalg.norm(windows.acceleration, axis=1))
+        share, acceleration = windows.share, windows.acceleration
     if explained is not None and np.isfinite(explained.unexplained):
         share, acceleration = explained.unexplained / explained.size, explained.acceleration
     if verdict == INTEGRATION_ERROR and slips is not None:

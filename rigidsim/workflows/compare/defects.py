@@ -29,40 +29,33 @@ _STEEP = 4.0  # sum of the absolute weights, beyond which rows lie too unevenly 
 
 
 @dataclass(frozen=True)
-class RowDefects:
-    """Defects from rows to the rows that follow.
-
-    Attributes:
-        rows: those that were started from.
-        attitude: rotation vectors (rows, 3), rad, space axes, from where the equations lead to the next row.
-        rates: differences (rows, 3), rad/s, body axes; of no use where rates aren't in the file.
-    """
-
-    rows: np.ndarray
-    attitude: np.ndarray
-    rates: np.ndarray
-
-
-@dataclass(frozen=True)
 class WindowDefects:
-    """Defects over windows of several rows.
+    """Defects over windows of several rows, rms over these.
 
     Attributes:
-        length: of a window, s (median). coarse: its length times the rate of the motion.
-        attitude: angles (windows,), rad, at the windows' ends.
-        explained: those that are the integral of the differences of rates.
-        unexplained: what is left of the attitude's.
+        length: of a window, s (median).
+        attitude: angles at the windows' ends, rad.
+        explained: those that are the integral of the differences of rates. unexplained: the rest.
         rates: differences of rates at the ends, rad/s.
-        acceleration: missing mean accelerations (windows, 3), rad/s^2, body axes.
+        acceleration: missing mean acceleration, rad/s^2.
     """
 
     length: float
-    coarse: float
-    attitude: np.ndarray
-    explained: np.ndarray
-    unexplained: np.ndarray
-    rates: np.ndarray
-    acceleration: np.ndarray
+    attitude: float
+    explained: float
+    unexplained: float
+    rates: float
+    acceleration: float
+
+    @property
+    def share(self) -> float:
+        """Unexplained over explained attitude defects."""
+        return self.unexplained / self.explained if self.explained else float("inf")
+
+
+def rms(values: np.ndarray) -> float:
+    """Root of the mean square of numbers (n,), or of the sizes of vectors (n, 3)."""
+    return float(np.sqrt(np.sum(values**2) / len(values)))
 
 
 def motion_rate(times: np.ndarray, rates: np.ndarray) -> float:
@@ -91,12 +84,18 @@ def windows_of_rows(times: np.ndarray, rate: float, length: float, parts: int, m
     return np.asarray(rows[gaps * rate < RESOLVED])
 
 
-def row_defects(equations: FromStates, times: np.ndarray, states: RowStates, rows: np.ndarray) -> RowDefects:
-    """Defects from some rows to the next ones; ``states`` are the trajectory's."""
+def row_defects(
+    equations: FromStates, times: np.ndarray, states: RowStates, rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Defects from some rows to the next ones; ``states`` are the trajectory's.
+
+    Returns:
+        Rotation vectors (rows, 3), rad, space axes, from where the equations lead to the next row, and
+        differences of rates (rows, 3), rad/s, body axes.
+    """
     begun = zip(states[rows], times[rows], times[rows + 1, None], strict=True)
     ends = np.stack([equations.after(*one)[0] for one in begun])
-    attitude, rates = _apart(equations, states[rows + 1], ends)
-    return RowDefects(rows, attitude, rates)
+    return _apart(equations, states[rows + 1], ends)
 
 
 def window_defects(
@@ -119,15 +118,8 @@ def window_defects(
     if not kept:
         return None
     theta, integral, rates, length = (np.array(x) for x in zip(*kept, strict=True))
-    return WindowDefects(
-        length=float(np.median(length)),
-        coarse=float(np.median(length) * rate),
-        attitude=np.linalg.norm(theta, axis=1),
-        explained=np.linalg.norm(integral, axis=1),
-        unexplained=np.linalg.norm(theta - integral, axis=1),
-        rates=np.linalg.norm(rates, axis=1),
-        acceleration=rates / length[:, None],
-    )
+    vectors = (theta, integral, theta - integral, rates, rates / length[:, None])
+    return WindowDefects(float(np.median(length)), *map(rms, vectors))
 
 
 def _one(

@@ -1,4 +1,9 @@
-"""What a trajectory shows beside the experiment: errors, drifts of invariants, and local defects."""
+"""What a trajectory shows beside the experiment, and what it means.
+
+Errors, drifts of invariants and local defects are measured. Then a verdict is given, in this order: its
+attitudes are the experiment's or not. They turn at its rates or not. Where the attitudes are others, its
+integration errs, its model is another one, or the two can't be separated.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +14,18 @@ import xarray
 
 from rigidsim.accuracy.comparison import parts_of, rotation_vectors
 from rigidsim.scene.row_rotations import angles_between, normalised
-from rigidsim.solve.from_states import FromStates, RowStates
+from rigidsim.scene.scene import Scene
+from rigidsim.solve.from_states import FromStates, NotFromStates, RowStates
 from rigidsim.workflows.compare import defects
-from rigidsim.workflows.compare.attitudes_alone import MOMENTS, STEADY, WindowsOfAttitudes
+from rigidsim.workflows.compare.attitudes_alone import MOMENTS, STEADY, WIDER, WindowsOfAttitudes
 from rigidsim.workflows.compare.columns import QUATERNION, Attitudes, size_of
 from rigidsim.workflows.compare.conventions import Convention
 
-ABOVE = 5.0
-"""Times what the digits of the file allow, from which on defects show something."""
+AGREES, INTEGRATION_ERROR, WRONG_MODEL, UNDECIDED = "agrees", "integration_error", "wrong_model", "undecided"
+INCONSISTENT_RATES = "inconsistent_rates"
+Verdict = tuple[str, str]
+"""A verdict, and why."""
+_ABOVE = 5.0  # times what the digits of the file allow, from which on defects show something
 _MOST_STARTS = 1500  # rows from which local defects are integrated
 _MOST_WINDOWS = 250
 _MOST_ALONE = 80  # windows of attitudes without rates
@@ -35,6 +44,28 @@ _CLEAR = 0.85  # share of the variance (of logarithms) that the power explains
 _STEEPEST, _FLATTEST = 20.0, 1.7  # slopes of methods of order 1 to 19
 _SIMILAR = 300.0  # ratio of large defects to small ones, up to which they are held
 _NORM = "quaternion_norm"
+_ROUNDING = 1e-13  # rad: what references in double precision, and quaternions of doubles, leave
+_MODEL, _INTEGRATOR = 0.2, 0.5
+"""Unexplained over explained attitude defects. Another model's are explained up to the integral's own error,
+some 1e-3 and less, and more in long windows of few rows; an integrator's unexplained ones exceed the
+explained by 2 / (rate T), 4 for the usual window, and 0.5 for the longest. In experiments/compare_conventions
+they are 0.86 and more in 264 loose integrations, and up to 0.12 in 200 other models (0.14 with another seed).
+"""
+_ALONE = 5e-4
+"""Defects that no change of the equations explains, over all, where attitudes are alone. Another model's are
+explained up to the error of the derivatives, some 5e-5 and less.
+"""
+_IN_NOISE = 0.02  # the same, of defects that are explained to the digits of the file
+_SURE = 1e3  # times what attitudes alone miss, by which they have to start elsewhere
+_START = 3.0  # times what defects add up to, from which on another start is what the error comes from
+_NO_RATES = 0.15
+"""Of the turn in a window: unexplained defects beyond that are no integrator's, whose steps would be a
+radian long, but those of rates that are something else.
+"""
+_FAR = np.pi / 3
+"""Turn (rad) from row to row, beyond which the rates' integral misses as much as loose integrations."""
+_SAME = 3.0  # factor within which the rates' first difference is what the attitudes' turning misses
+_AGREE = 10.0  # times the attitude's floor per radian of the motion, that rates may differ by and agree
 
 
 class Evidence:
@@ -56,18 +87,17 @@ class Evidence:
 
     def __init__(
         self, given: Attitudes, convention: Convention, own: xarray.Dataset, uncertainty: float,
-        within: float, told: list[str],
+        within: float, told: list[str], scene: Scene,
     ) -> None:  # fmt: skip
         """Read the rows.
 
         Args:
             own: the experiment at the trajectory's times. uncertainty: announced error of its attitude, rad.
             within: rad, what attitudes may differ by and agree. told: gets what a user should know.
+            scene: of the experiment, whose equations each row may start.
         """
         self.given, self.convention, self.told = given, convention, told
         self._uncertainty, self._within = uncertainty, within
-        self.states: RowStates | None = None
-        self.why_not = ""
         self.explained: WindowsOfAttitudes | None = None
         self.times, self.quaternions = given.times, convention.quaternions(given)
         self.span = float(self.times[-1] - self.times[0])
@@ -97,6 +127,12 @@ class Evidence:
         self._exact, most = apart <= exact, given.resolution[2]
         rounded = not self._exact and apart <= 2 * most  # times that would be even but for their digits
         self.attitude_noise = self.resolution + (self.rate * most / np.sqrt(3) if rounded else 0.0)
+        self.states: RowStates | None = None
+        try:
+            self.states = self._states_of(FromStates(scene))
+        except NotFromStates as error:
+            self.why_not = str(error)
+            told.append(f"neither local defects nor drifts were measured: {error}")
 
     @cached_property
     def floor(self) -> tuple[float, str]:
@@ -136,21 +172,16 @@ class Evidence:
 
     # --- by the experiment's equations ----------------------------------------------------------------------
 
-    def begin_from(self, equations: FromStates) -> None:
-        """Let each row be a start of the experiment's equations.
-
-        Raises:
-            NotFromStates: the experiment's motion ends before.
-        """
+    def _states_of(self, equations: FromStates) -> RowStates:
+        """Each row as a start of the experiment's equations."""
         given, rates = self.given, self.own_rates if self.rates is None else self.rates
         flight = None
         if given.positions is not None and given.velocities is not None:
             flight = np.concatenate([given.positions, given.velocities], axis=1)
-        base = equations.motion(self.times)
-        self.states = RowStates(equations, base, self.quaternions, rates, flight)
         if equations.others:
             names = ", ".join(equations.others)
             self.told.append(f"the file has no {names}: each interval begins with the experiment's own")
+        return RowStates(equations, equations.motion(self.times), self.quaternions, rates, flight)
 
     def drifts(self) -> dict[str, np.ndarray]:
         """Of the invariants by the file alone, relative, (rows,) each."""
@@ -184,8 +215,13 @@ class Evidence:
         starts = near if len(near) else starts
         if len(starts) < count:
             self.told.append(f"local defects were measured from {len(starts):,} of {count:,} rows")
-        found = defects.row_defects(self.states.equations, self.times, self.states, starts)
-        return starts, np.linalg.norm(found.attitude, axis=1), np.linalg.norm(found.rates, axis=1)
+        turns, slips = defects.row_defects(self.states.equations, self.times, self.states, starts)
+        return starts, np.linalg.norm(turns, axis=1), np.linalg.norm(slips, axis=1)
+
+    @property
+    def slip(self) -> float:
+        """Difference of the first rates, rad/s."""
+        return 0.0 if self.rate_errors is None else float(self.rate_errors[0])
 
     @cached_property
     def windows(self) -> defects.WindowDefects | None:
@@ -204,10 +240,10 @@ class Evidence:
     def alone(self) -> WindowsOfAttitudes | None:
         """The same over windows in which defects exceed the digits, with what explains them."""
         span, length, found = self.span * self.rate, _WINDOW, self.first_alone
-        while found is not None and found.size <= ABOVE * self.attitude_noise and length < span:
+        while found is not None and found.size <= _ABOVE * self.attitude_noise and length < span:
             length = min(_LONGER * length, span)
             found = self._alone(length) or found
-        if found is not None and found.size > ABOVE * self.attitude_noise:
+        if found is not None and found.size > _ABOVE * self.attitude_noise:
             found.explain(self.attitude_noise, STEADY if span >= _LONG else MOMENTS)
             self.explained = found
         return found
@@ -236,7 +272,7 @@ class Evidence:
         assert self.local is not None
         starts, sizes, _ = self.local
         intervals = np.diff(self.times)[starts]
-        seen = np.isfinite(sizes) & (sizes > ABOVE * self.attitude_noise)
+        seen = np.isfinite(sizes) & (sizes > _ABOVE * self.attitude_noise)
         if seen.sum() < max(_LEAST_ROWS, len(seen) / 2):
             return None, None
         x, y = np.log(intervals[seen]), np.log(sizes[seen])
@@ -248,3 +284,132 @@ class Evidence:
             return (slope - 1 if unequal >= _MUCH and _FLATTEST <= slope <= _STEEPEST else None), None
         alike = np.exp(np.subtract(*np.quantile(y, [0.9, 0.1]))) <= _SIMILAR
         return None, (float(np.quantile(sizes[seen], 0.95)) if alike else None)
+
+
+# --- the verdict -------------------------------------------------------------------------------------------
+
+
+def judged(seen: Evidence) -> Verdict:
+    """The verdict on a trajectory."""
+    if (found := _agreement(seen)) is not None:
+        return found
+    if seen.states is None:
+        return UNDECIDED, f"model and integration can't be distinguished: {seen.why_not}"
+    windows = seen.windows
+    if windows is None:
+        alone = seen.alone
+        return (_elsewhere_alone(seen, alone) if alone else None) or _by_attitudes(seen, alone)
+    return (
+        _contradiction(seen, windows)
+        or _elsewhere(seen, seen.slip, windows.attitude, windows.rates, windows.length)
+        or _by_rates(seen, windows)
+        or _by_attitudes(seen, seen.alone)
+    )
+
+
+def _agreement(seen: Evidence) -> Verdict | None:
+    """Of attitudes that are the experiment's; None for others."""
+    floor, reason = seen.floor
+    if seen.errors.max() > floor:
+        return None
+    slip = 0.0 if seen.rate_errors is None else float(seen.rate_errors.max())
+    agree = seen.rates is None or slip <= 4 * seen.rate_noise + _AGREE * floor * seen.rate
+    if agree and (seen.rates is not None or seen.turn < np.pi):
+        return AGREES, reason
+    if seen.turn >= np.pi:
+        return UNDECIDED, (
+            f"its attitudes are the experiment's, but from row to row the motion turns by "
+            f"{np.degrees(seen.turn):.3g} deg, so that other motions have the same rows; write more rows, or "
+            "angular velocities (wx wy wz) that agree"
+        )
+    return INCONSISTENT_RATES, (
+        f"its attitudes are the experiment's, but they don't turn at its rates, which differ by "
+        f"up to {slip:.3g} rad/s, at a motion of {seen.rate:.3g} rad/s"
+    )
+
+
+def _contradiction(seen: Evidence, windows: defects.WindowDefects) -> Verdict | None:
+    """Of rates that aren't those at which the attitudes turn; None for others."""
+    missed = windows.unexplained / windows.length
+    slip = seen.slip
+    moved = slip > max(_ABOVE * seen.rate_noise, seen.floor[0] * seen.rate)
+    if missed <= _NO_RATES * seen.rate and not (moved and slip / _SAME < missed < slip * _SAME):
+        return None
+    return INCONSISTENT_RATES, (
+        f"its attitudes don't turn at its rates: these miss {missed:.3g} rad/s, at a motion of "
+        f"{seen.rate:.3g} rad/s; remove the rates to have its attitudes judged alone"
+    )
+
+
+def _elsewhere(seen: Evidence, slip: float, attitude: float, rates: float, length: float) -> Verdict | None:
+    """Of another start, which outweighs defects (rad, rad/s) over windows of a length (s)."""
+    angle, floor = float(seen.errors[0]), seen.floor[0]
+    collected = seen.span / length * (attitude + rates * seen.span)
+    noise = seen.rate_noise + seen.attitude_noise / length
+    if angle <= floor and slip <= max(_ABOVE * noise, floor * seen.rate):
+        return None
+    if angle + slip * seen.span <= _START * collected:
+        return None
+    apart = f"{angle:.3g} rad and {slip:.3g} rad/s apart"
+    return UNDECIDED, f"it starts elsewhere, {apart}, which outweighs what its equations miss on the way"
+
+
+def _elsewhere_alone(seen: Evidence, windows: WindowsOfAttitudes) -> Verdict | None:
+    """Of attitudes alone whose first rates differ, where their defects are nothing."""
+    slip = float(np.linalg.norm(windows.rates[0] - seen.own_rates[windows.rows[0, 0]]))
+    size, length = windows.size, windows.length
+    if slip * length <= _SURE * size and seen.errors[0] <= seen.floor[0]:
+        return None
+    return _elsewhere(seen, slip, size, size / length, length)
+
+
+def _by_rates(seen: Evidence, windows: defects.WindowDefects) -> Verdict | None:
+    """By kinematics; None where defects are within the digits."""
+    noise = seen.attitude_noise + seen.rate_noise * windows.length + _ROUNDING
+    if max(windows.attitude, windows.explained) <= _ABOVE * noise:
+        return None
+    left, share = windows.unexplained, windows.share
+    told = (
+        f"of the attitude's defects ({windows.attitude:.2g} rad over spans of {windows.length:.3g} s) "
+        f"differences of the rates explain {windows.explained:.2g} rad and leave {left:.2g} rad"
+    )
+    if share <= _MODEL or left <= 2 * noise:
+        return WRONG_MODEL, f"its equations are others, by {windows.acceleration:.3g} rad/s^2: {told}"
+    if seen.turn > _FAR:
+        return UNDECIDED, f"{_rows_apart(seen)}: {told}"
+    if share >= _INTEGRATOR:
+        return INTEGRATION_ERROR, f"its equations are these, loosely integrated: {told}"
+    return UNDECIDED, f"both its model and its integration may differ: {told}"
+
+
+def _by_attitudes(seen: Evidence, windows: WindowsOfAttitudes | None) -> Verdict:
+    """By attitudes alone."""
+    if windows is None:
+        return UNDECIDED, _rows_apart(seen)
+    noise = seen.attitude_noise + _ROUNDING
+    if windows.size <= _ABOVE * noise:
+        return UNDECIDED, (
+            f"local defects ({windows.size:.2g} rad) are within the digits of the file ({noise:.2g} rad); "
+            "write more digits to tell a model from an integration"
+        )
+    share, left = windows.unexplained / windows.size, windows.unexplained
+    told = f"of the attitudes' defects ({windows.size:.2g} rad) other moments or steady torques leave"
+    if share <= _ALONE or (left <= 2 * noise and share <= _IN_NOISE):
+        more = f"by {windows.acceleration:.3g} rad/s^2"
+        return WRONG_MODEL, f"its equations are others, {more}: {told} {left:.2g} rad"
+    windows.explain(noise, WIDER)
+    if windows.unexplained / windows.size > _ALONE:
+        loose = "its equations are these, loosely integrated"
+        return INTEGRATION_ERROR, f"{loose}: {told} {windows.unexplained:.2g} rad"
+    return UNDECIDED, (
+        f"its model and its integration can't be distinguished: {told} {left:.2g} rad; write angular "
+        "velocities too (wx wy wz), or more rows"
+    )
+
+
+def _rows_apart(seen: Evidence) -> str:
+    turn, most = np.degrees([seen.turn, _FAR])
+    return (
+        f"rows are too far apart to separate a model from an integration: the motion turns by {turn:.3g} deg "
+        f"from row to row; write rows at most {most:.0f} deg apart"
+    )
