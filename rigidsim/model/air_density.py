@@ -173,7 +173,7 @@ def _check(scene: Scene) -> None:
             scene, f"{given}by several loads with different {', '.join(INDICES)}; give them the same"
         )
     source = flown_about(scene.config)
-    strength = getattr(source.of(scene), "strength", None) if source is not None else None
+    strength = None if source is None else source.of(scene).gravitational_parameter
     if strength is not None and not EARTH.attracts_by(strength):
         what = f"the Earth's air, where {value_text(strength, 'm^3/s^2')} attracts the body, which isn't the "
         raise _fault(scene, f"{given}{what}Earth; give density, altitude and scale_height of its air")
