@@ -9,11 +9,11 @@ Errors are measured by leaving out and interpolating every other row; for the el
 ``rigidsim.scene.orbit_tables.pieces``.
 """
 
+from __future__ import annotations
+
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -28,89 +28,42 @@ NEAREST = 7
 
 
 class Interpolation:
-    """Interpolation between rows (times, columns) of floats, or of mpf in an array of objects."""
+    """Interpolation between rows of ``values`` (rows, columns), which are ``lengths`` (rows - 1,) apart: of
+    floats, or of mpf in arrays of objects.
+    """
 
-    def __init__(self, times: Sequence[Any], values: np.ndarray) -> None:
-        self.times = times
-        self.values = values
-        self._count = min(NEAREST, len(times))
-        self._derivatives: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-        self._weights: dict[tuple[Any, ...], tuple[np.ndarray, np.ndarray]] = {}
+    def __init__(self, lengths: np.ndarray, values: np.ndarray) -> None:
+        self.lengths, self.values = lengths, values
 
-    def piece(self, number: int) -> np.ndarray:
-        """Coefficients (6, columns) of the powers of (t - t_i) / (t_{i+1} - t_i)."""
-        length = self.times[number + 1] - self.times[number]
-        y0, y1 = self.values[number], self.values[number + 1]
-        (d0, s0), (d1, s1) = self._at(number), self._at(number + 1)
-        square = length * length / 2
-        a, b = d0 * length, s0 * square  # arrays first: mpmath would print one that it doesn't know
-        # remainder at the far end for the powers 3 to 5: value, derivative, and half the second derivative
-        u = y1 - (y0 + a + b)
-        v = d1 * length - (a + b * 2)
-        w = s1 * square - b
-        return np.array([y0, a, b, u * 10 - v * 4 + w, v * 7 - u * 15 - w * 2, u * 6 - v * 3 + w])
+    def narrowed(self) -> Interpolation:
+        """The same, of mpf, in the platform's longest floating point, of at least double precision."""
+        return Interpolation(_in_80_bits(self.lengths), _in_80_bits(self.values))
 
-    def narrow_pieces(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The same of many pieces (n,) in 80 bits, which become doubles: lengths (n,) in units of
-        time, and coefficients (n, 6, columns). Columns must not grow beyond order one.
+    def pieces(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of pieces (n,) lengths (n,), and coefficients (n, 6, columns) of the powers of
+        (t - t_i) / (t_{i+1} - t_i). Floats must not grow beyond order one.
         """
-        lengths, values = self._narrow
+        lengths, values, count = self.lengths, self.values, min(NEAREST, len(self.values))
         both = np.stack([numbers, numbers + 1])
-        first = np.clip(both - self._count // 2, 0, len(self.times) - self._count)
-        near = first[..., None] + np.arange(self._count)
+        first = np.clip(both - count // 2, 0, len(values) - count)
+        near = first[..., None] + np.arange(count)
         ends = np.cumsum(lengths[near[..., :-1]], axis=-1)  # from the first of the rows around
-        offsets = np.concatenate([np.zeros((*both.shape, 1), np.longdouble), ends], axis=-1)
+        offsets = np.concatenate([np.zeros((*both.shape, 1), lengths.dtype), ends], axis=-1)
         here = (both - first)[..., None]
         offsets = offsets - np.take_along_axis(offsets, here, axis=-1)
         d, s = (np.einsum("ani,anic->anc", w, values[near]) for w in _weights(offsets, here))
         length = lengths[numbers]
         y0, y1, step = values[numbers], values[numbers + 1], length[:, None]
         a, b = d[0] * step, s[0] * step * step / 2
-        u, v, w = y1 - (y0 + a + b), d[1] * step - (a + 2 * b), s[1] * step * step / 2 - b
-        powers = [y0, a, b, 10 * u - 4 * v + w, 7 * v - 15 * u - 2 * w, 6 * u - 3 * v + w]
+        # remainder at the far end for the powers 3 to 5: value, derivative, and half the second derivative
+        u, v, w = y1 - (y0 + a + b), d[1] * step - (a + b * 2), s[1] * step * step / 2 - b
+        powers = [y0, a, b, u * 10 - v * 4 + w, v * 7 - u * 15 - w * 2, u * 6 - v * 3 + w]
         return length, np.stack(powers, axis=1)
 
-    @cached_property
-    def _narrow(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lengths between rows, and values, in 80 bits."""
-        lengths = [b - a for a, b in pairwise(self.times)]
-        return _in_80_bits(lengths), _in_80_bits(self.values.ravel()).reshape(self.values.shape)
 
-    def _at(self, row: int) -> tuple[np.ndarray, np.ndarray]:
-        """First and second derivatives (columns,) at a row, by finite differences."""
-        if row not in self._derivatives:
-            first = min(max(row - self._count // 2, 0), len(self.times) - self._count)
-            near = range(first, first + self._count)
-            one, two = self._differentiation(tuple(self.times[j] - self.times[row] for j in near))
-            rows = self.values[first : first + self._count]
-            self._derivatives[row] = one @ rows, two @ rows
-        return self._derivatives[row]
-
-    def _differentiation(self, offsets: tuple[Any, ...]) -> tuple[np.ndarray, np.ndarray]:
-        """Weights of the values at offsets from a row in its first and second derivative."""
-        if offsets not in self._weights:
-            here = next(i for i, x in enumerate(offsets) if x == 0)
-            products = [math.prod([x - y for y in offsets if y != x]) for x in offsets]
-            one = [
-                products[here] / (p * (offsets[here] - x)) if i != here else x
-                for i, (x, p) in enumerate(zip(offsets, products, strict=True))
-            ]
-            one[here] = -sum(w for i, w in enumerate(one) if i != here)
-            two = [
-                2 * w * (one[here] - 1 / (offsets[here] - x)) if i != here else x
-                for i, (w, x) in enumerate(zip(one, offsets, strict=True))
-            ]
-            two[here] = -sum(w for i, w in enumerate(two) if i != here)
-            self._weights[offsets] = np.array(one), np.array(two)
-        return self._weights[offsets]
-
-
-def _in_80_bits(numbers: Iterable[Any]) -> np.ndarray:
-    """Numbers (mpf) as the platform's longest floating point, of at least double precision."""
-    exact = list(numbers)
-    high = np.array([float(x) for x in exact])
-    low = np.array([float(x - one) for x, one in zip(exact, high.tolist(), strict=True)])
-    return high.astype(np.longdouble) + low
+def _in_80_bits(exact: np.ndarray) -> np.ndarray:
+    high = exact.astype(np.float64)
+    return high.astype(np.longdouble) + (exact - high).astype(np.float64)
 
 
 def _weights(offsets: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -134,14 +87,12 @@ def _weights(offsets: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 def left_out(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Every other row's number, and values (rows, columns) interpolated there from the others, in float64."""
-    kept = Interpolation(list(times[::2]), values[::2])
-    rows = np.arange(1, 2 * len(kept.times) - 2, 2)
-    found = []
-    for row in rows:
-        part = kept.piece(int(row) // 2)
-        x = (times[row] - times[row - 1]) / (times[row + 1] - times[row - 1])
-        found.append(((((part[5] * x + part[4]) * x + part[3]) * x + part[2]) * x + part[1]) * x + part[0])
-    return rows, np.array(found)
+    kept = Interpolation(np.diff(times[::2]), values[::2])
+    rows = np.arange(1, 2 * len(kept.values) - 2, 2)
+    lengths, parts = kept.pieces(rows // 2)
+    x = ((times[rows] - times[rows - 1]) / lengths)[:, None]
+    c = np.moveaxis(parts, 1, 0)
+    return rows, ((((c[5] * x + c[4]) * x + c[3]) * x + c[2]) * x + c[1]) * x + c[0]
 
 
 @dataclass(frozen=True)

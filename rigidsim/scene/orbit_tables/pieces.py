@@ -62,7 +62,7 @@ class TabulatedOrbit:
         self.moving: tuple[str, ...] = tuple(moving)
         """The elements that change, among axis, k, h, q, p, longitude."""
         columns = np.array([self._rows[name] for name in moving], dtype=object).T
-        self._interpolation = Interpolation(list(table.times), columns)
+        self._interpolation = Interpolation(np.diff(np.array(table.times, dtype=object)), columns)
         self._pieces: dict[int, dict[str, list[Any]]] = {}
 
     def __eq__(self, other: object) -> bool:
@@ -137,14 +137,18 @@ class TabulatedOrbit:
     def piece(self, number: int) -> dict[str, list[Any]]:
         """For each changing element, the coefficients of the powers 0 to 5 of (t - t_i) / (t_{i+1} - t_i)."""
         if number not in self._pieces:
-            coefficients = self._interpolation.piece(number)
-            self._pieces[number] = {name: list(coefficients[:, i]) for i, name in enumerate(self.moving)}
+            _, coefficients = self._interpolation.pieces(np.array([number]))
+            self._pieces[number] = {name: list(coefficients[0, :, i]) for i, name in enumerate(self.moving)}
         return self._pieces[number]
 
     def narrow_pieces(self, numbers: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        """See ``Interpolation``: lengths (n,), s, and for each changing element coefficients (n, 6)."""
-        lengths, found = self._interpolation.narrow_pieces(numbers)
+        """Of many pieces in 80 bits: lengths (n,), s, and for each changing element coefficients (n, 6)."""
+        lengths, found = self._narrow.pieces(numbers)
         return lengths, {name: found[:, :, i] for i, name in enumerate(self.moving)}
+
+    @cached_property
+    def _narrow(self) -> Interpolation:
+        return self._interpolation.narrowed()
 
     def row(self, number: int) -> dict[str, Any]:
         """All elements of a row of the table."""
