@@ -15,11 +15,11 @@ from rigidsim.model.load import Load
 from rigidsim.scene.arithmetic import working_bits
 from rigidsim.scene.choices import DEFAULT_FORMULATION, variables_named
 from rigidsim.scene.config import Experiment
+from rigidsim.solve.assembly import assemble
+from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.problem import InitialValueProblem, prepare_scene
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.stepper import Stepper
-from rigidsim.solve.switching.stepper import stepper_of
-from rigidsim.solve.taylor_stepper import TaylorStepper
 
 PILOT_STEPS = 20_000
 """Pilot steps in double precision at its epsilon: some tens of milliseconds."""
@@ -80,18 +80,15 @@ def run_pilot(
     )
 
 
-def growth_of(prepared: InitialValueProblem, step: float, stepper: TaylorStepper | None = None) -> Estimate:
+def growth_of(prepared: InitialValueProblem, step: float, corrected: CorrectedStepper) -> Estimate:
     """How a motion amplifies errors: their estimate over its first steps, of a mean length in internal units
-    (takes some 30 ms).
-
-    Args:
-        stepper: one of the motion in double precision, if there is one.
+    (takes some 30 ms in double precision).
     """
     clock = prepared.clock
     steps = min(_FOLLOWED, math.ceil((float(clock.at(clock.count - 1)) - float(clock.start)) / step))
     begin, last = float(prepared.scene.start), float(prepared.scene.samples.last)
     reached = begin + math.copysign(min(abs(steps * step * clock.unit), abs(last - begin)), last - begin)
-    found = estimate_errors(prepared, steps, reached, stepper=stepper)
+    found = estimate_errors(prepared, steps, reached, corrected=corrected)
     assert found is not None
     return found
 
@@ -127,14 +124,14 @@ def motion_of(experiment: Experiment, *, loads: Sequence[Load] = ()) -> KnownMot
     """Examine the beginning of a motion (some tens of milliseconds)."""
     scene = trial_scene(experiment, Setting())
     prepared = compactly(prepare_scene(experiment, scene, loads=loads))
-    stepper = stepper_of(prepared.system, prepared.precision, None, prepared.clock.start)
-    pilot = run_pilot(stepper, prepared.clock)
+    corrected = assemble(prepared).steps()
+    pilot = run_pilot(corrected.stepper, prepared.clock, corrected.skip)
     form, _ = closed_form_if_any(scene, driven=bool(loads))
     return KnownMotion(
         steps=pilot.whole,
         rate=float(prepared.system.rate_bound),
         seconds=abs(float(scene.samples.last - scene.start)),
-        growth=growth_of(prepared, pilot.step, stepper),
+        growth=growth_of(prepared, pilot.step, corrected),
         holds=any(i.name != "energy_balance" for i in prepared.system.invariants),
         exact=form.method if form else "",
     )

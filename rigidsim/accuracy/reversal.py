@@ -108,7 +108,9 @@ def there_and_back(experiment: Experiment, loads: Sequence[Load] = ()) -> Revers
     other = _taken(back, names, "the motion back")
     found = {_SMALL[name]: _apart(name, one[name], other[name]) for name in names}
     begun, own = (
-        estimate_errors(problem, way.progress.steps, float(problem.scene.samples.last))
+        estimate_errors(
+            problem, way.progress.steps, float(problem.scene.samples.last), corrected=way.parts.corrected
+        )
         for problem, way in ((there, one), (back, other))
     )
     return Reversal(

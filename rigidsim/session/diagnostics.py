@@ -17,11 +17,10 @@ from rigidsim.session.recorder import SampleStatistics
 from rigidsim.session.session import AdviceLimits
 from rigidsim.session.understood import time_words
 from rigidsim.solve.corrected_stepper import CorrectedStepper
-from rigidsim.solve.effects.waypoints import SampleTrail, Waypoints
+from rigidsim.solve.effects.waypoints import SampleTrail
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sampler import Progress
 from rigidsim.solve.stepper import OwnErrors
-from rigidsim.solve.taylor_stepper import TaylorStepper
 from rigidsim.store.summary_parts import Advice, AdviceCode, Modelling
 
 NEAR_SINGULAR = 1e-3
@@ -58,15 +57,12 @@ class Diagnostics:
         """The diagnostics with an estimate of the errors; a ``go_on`` that gives False ends it without a
         result.
         """
-        progress, stepper, beside = self.progress, None, ""
+        progress, beside = self.progress, ""
         if self.prepared.algorithm.own_errors:
             told = own()
             return self if told is None else replace(self, estimate=Estimate(**vars(told)))
         if corrected is not None:
-            registered = [effect for effect in corrected.effects if effect.registered]
-            alone = not any(effect.rewrites for effect in registered)  # its equations need nothing besides
-            stepper = corrected.stepper if alone and isinstance(corrected.stepper, TaylorStepper) else None
-            acting = [effect.registered for effect in registered if not effect.rewrites]
+            acting = [one.registered for one in corrected.effects if one.registered and not one.rewrites]
             if acting:  # which a closed form knows nothing of
                 trail, beside = None, f"; they are without the effects {', '.join(acting)}"
         last = float(self.prepared.scene.samples.last)
@@ -75,8 +71,7 @@ class Diagnostics:
             progress.steps,
             min(progress.time, last, key=lambda time: abs(time - float(self.prepared.scene.start))),
             trail=trail,
-            waypoints=None if corrected is None else corrected.effect(Waypoints),
-            stepper=stepper,
+            corrected=corrected,
             go_on=go_on,
         )
         if found is not None and beside:

@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import heyoka as hy
@@ -35,9 +35,12 @@ TANGENTS = 3
 0.3 % (Student's t at 9, where one direction leads); of 60 planar spins one was 11 times as wrong as
 announced.
 """
-_SHORTEST, _LONGEST = 4, 4096
+SHORTEST, _LONGEST = 4.0, 4096.0
 """Steps of a stretch. They are counted in steps, among which those of a close passage are many, not in time,
 of which they take little.
+"""
+_PART_OF_STEP = 2.0**-4
+"""Shortest stretch of a stepper: a step in 200 digits, of order 230, spans some 11 e-folds of an instability.
 """
 _CALM, _WILD = 8.0, 64.0
 """Growth over a stretch below which stretches may become longer, and above which they are repeated, shorter.
@@ -60,7 +63,9 @@ _APART = 2.0**-30  # of a state's size, at which neighbours of a motion that swi
 
 
 class Carrier(Protocol):
-    """What integrates motions with their tangents."""
+    """What integrates motions with their tangents, over stretches of ``shortest`` steps or more."""
+
+    shortest: float
 
     def advance(
         self,
@@ -99,6 +104,8 @@ class LaneCarrier:
     """A single motion and its neighbours in the lanes of a batch: their distances are the tangents. Exact
     ones take three times as long, and ten times as long to compile.
     """
+
+    shortest = SHORTEST
 
     def __init__(self, system: System, tolerance: float, *, compact: bool) -> None:
         self._first, self._pieces = parameters_of(system), system.pieces
@@ -165,13 +172,20 @@ class LaneCarrier:
 
 
 class SteppedCarrier:
-    """A single motion by a stepper that ends its steps on switching surfaces, and its tangents by neighbours,
-    which are on the same sides as it is.
+    """A single motion by a stepper that ends its steps on switching surfaces, and its tangents by neighbours
+    in double precision, which are on the same sides as it is.
+
+    The motion itself goes on in the run's arithmetic: in fewer bits it would leave an unstable rest early,
+    and tangents would be those of another motion.
     """
 
-    def __init__(self, stepper: TaylorStepper, start: float, end: float, steps: int) -> None:
-        self._stepper, self._pace = stepper, steps / (end - start)
-        self._reached = start, stepper.begun  # by the motion itself, which may slide
+    shortest = _PART_OF_STEP
+
+    def __init__(self, own: TaylorStepper, near: TaylorStepper, start: float, end: float, steps: int) -> None:
+        self._near, self._pace = near, steps / (end - start)
+        self._steppers = [near] if own is near else [near, own]
+        # of the motion, which may slide: where the latest stretch began, and where it ended
+        self._marks = {start: [stepper.begun for stepper in self._steppers]}
 
     def advance(
         self,
@@ -184,40 +198,38 @@ class SteppedCarrier:
         steps: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """See ``Carrier``."""
-        found, moved = states.copy(), tangents.copy()
         first, until = float(begin[0]), min(float(end[0]), float(begin[0]) + float(steps[0]) / self._pace)
-        factors = beside(tangents, late)[0]
-        after = self._to(states[:, 0], first, first, until)
-        if after is None:
-            return found * np.nan, moved, np.ones(1), end
-        reached = until, replace(self._stepper.mark(), time=(until, 0.0))
-        found[:, 0] = after
-        for j, factor in enumerate(factors.tolist()):
+        taken, time, moved = np.array([(until - first) * self._pace]), np.array([until]), tangents.copy()
+        marks: list[Mark] = []
+        for stepper, known in zip(self._steppers, self._marks[first], strict=True):
+            if stepper is not self._near or (known.state == states[:, 0]).all():
+                stepper.back_to(known)
+            else:
+                self._set(first, first, states[:, 0])
+            there, zero = (stepper.precision.of_double(x) for x in (until, 0.0))
+            if not stepper.to(there):
+                return states * np.nan, moved, taken, time
+            marks.append(replace(stepper.mark(), time=(there, zero)))
+        base, *_, own = [np.array([float(x) for x in mark.state]) for mark in (marks[0], *marks)]
+        for j, factor in enumerate(beside(tangents, late)[0].tolist()):
             shift = factor * float(late[0, j])
-            there = self._to(states[:, 0] + factor * tangents[:, 0, j], first, first + shift, until + shift)
-            if there is None:
-                return found * np.nan, moved, np.ones(1), end
-            moved[:, 0, j] = (there - after) / factor
-        self._reached = reached
-        return found, moved, np.array([max(round((until - first) * self._pace), 1)]), np.array([until])
+            self._set(first, first + shift, states[:, 0] + factor * tangents[:, 0, j])
+            if not self._near.to(until + shift):
+                return states * np.nan, moved, taken, time
+            moved[:, 0, j] = (np.array(self._near.state, dtype=float) - base) / factor
+        # what moves in the run's arithmetic alone is rounded, too: a last bit shows that it does
+        still = np.array([x == y for x, y in zip(marks[-1].state, known.state, strict=True)])
+        own = np.where((own == states[:, 0]) & ~still, np.nextafter(own, np.inf), own)
+        self._marks = {first: self._marks[first], until: marks}
+        return own[:, None], moved, taken, time
 
-    def _to(self, state: np.ndarray, first: float, begin: float, end: float) -> np.ndarray | None:
-        """The state at the end from one at a time that is ``first`` but for a small error."""
-        stepper, (time, known) = self._stepper, self._reached
-        known = known if time == first else stepper.begun
-        if begin == first and (known.state == state).all():
-            stepper.back_to(known)
-        else:
-            pieces = stepper.system.pieces
-            # none is past an edge that the motion isn't, where it would go on with what holds before
-            edges = [] if pieces is None else pieces.knots[bisect_left(pieces.knots, first) :][:1]
-            stepper.back_to(self._from(known, min([begin, *map(float, edges)]), state))
-            stepper.settle()
-        return np.array(stepper.state, dtype=float) if stepper.to(end) else None
-
-    @staticmethod
-    def _from(known: Mark, time: float, state: np.ndarray) -> Mark:
-        return replace(known, time=(time, 0.0), state=state.copy())
+    def _set(self, first: float, begin: float, state: np.ndarray) -> None:
+        """Set the neighbours' stepper on a state at a time that is ``first`` but for a small error."""
+        near, pieces, known = self._near, self._near.system.pieces, self._marks[first][0]
+        # none is past an edge that the motion isn't, where it would go on with what holds before
+        edges = [] if pieces is None else pieces.knots[bisect_left(pieces.knots, first) :][:1]
+        near.back_to(replace(known, time=(min([begin, *map(float, edges)]), 0.0), state=state.copy()))
+        near.settle()
 
 
 # --- kicks ------------------------------------------------------------------------------------------------
@@ -288,24 +300,21 @@ class ErrorTangents:
         stretches: int = 12,
     ) -> None:
         self._carrier, self._measures, self._errors = carrier, measures, perturbations
-        self._epsilon = epsilon
-        self._starts, self._known, self._held = starts, known, held
-        motions = len(starts.begin)
-        self._states = starts.states.copy()
-        self._tangents = np.zeros((*starts.states.shape, TANGENTS))
-        self.time, self._steps = starts.begin.copy(), np.zeros(motions)
-        self._ahead, self._over = np.zeros(motions), np.zeros(motions)
+        self._starts, self._held, self._epsilon = starts, held, epsilon
+        self._known = known or Known(np.zeros((0, len(starts.begin))), np.zeros((0, *starts.states.shape)))
+        motions, self._states = len(starts.begin), starts.states.copy()
+        self.time, self.spread = starts.begin.copy(), Spread(motions)
+        self._steps, self._ahead, self._extent, self._lead = np.zeros((4, motions))
         self._random = np.random.default_rng(0)
-        self.spread = Spread(motions)
         longest = 2.0 ** np.floor(np.log2(np.maximum(math.sqrt(2) * starts.steps / stretches, 1.0)))
-        self._most = np.minimum(np.clip(longest, _SHORTEST, _LONGEST), perturbations.together)
+        self._most = np.minimum(np.clip(longest, SHORTEST, _LONGEST), perturbations.together)
         self._stride = self._most.copy()
-        normal = self._random.standard_normal((len(starts.states), 1, TANGENTS))
         begun = (starts.states != 0) if rounded is None else rounded[:, None]
-        begun = begun & (np.abs(starts.states) > _NOTHING)
-        sizes = np.where(begun, np.abs(starts.states), 0.0)
-        self._add(np.arange(motions), self._errors.first * sizes[:, :, None] * normal)
-        self._far = self._lengths(self._tangents)
+        sizes = np.where(begun & (np.abs(starts.states) > _NOTHING), np.abs(starts.states), 0.0)
+        normal = self._random.standard_normal((len(starts.states), TANGENTS))
+        first = np.full(motions, (perturbations.first / perturbations.own) ** 2)
+        self._tangents = self._kicks(first, sizes, normal)
+        self._sizes = np.zeros_like(sizes)  # of what moves and is rounded; not known before the first stretch
 
     def follow(
         self,
@@ -317,117 +326,83 @@ class ErrorTangents:
         ends = np.minimum(self._starts.end, until)
         with np.errstate(all="ignore"):
             while True:
-                going = np.flatnonzero(self.spread.whole & (self.time < ends) & (self._over < lost))
+                going = np.flatnonzero(self.spread.whole & (self.time < ends) & (self._lead < lost))
                 if not len(going) or not go_on():
                     return self.spread
-                self._go(going, self._next(going, ends[going]))
+                known = self._known.times[:, going]
+                ahead = np.where(known > self.time[going], known, math.inf)
+                self._stretch(going, np.minimum(ahead.min(axis=0, initial=math.inf), ends[going]))
 
-    def _next(self, going: np.ndarray, ends: np.ndarray) -> np.ndarray:
-        """Times until which to go: the next place that is known, or the end."""
-        if self._known is None:
-            return ends
-        ahead = np.where(
-            self._known.times[:, going] > self.time[going], self._known.times[:, going], math.inf
-        )
-        return np.minimum(ahead.min(axis=0, initial=math.inf), ends)
-
-    def _go(self, going: np.ndarray, until: np.ndarray) -> None:
-        """Follow some motions through one stretch."""
+    def _stretch(self, going: np.ndarray, until: np.ndarray) -> None:
+        """Follow some motions through one stretch, with the errors of half of its steps added before it, and
+        those of the others after it. Where tangents grow too much it is repeated, shorter.
+        """
         # the same number of draws in each round, for whichever motions
-        normal = self._random.standard_normal((2 + len(self._states), TANGENTS))
-        before, begin, steps = self._states[:, going], self.time[going], self._steps[going]
-        # what moves is rounded; until that is known, little is left out
-        stride = np.where(steps > 0, self._stride[going], float(_SHORTEST))
-        left = self._starts.steps[going] - steps
-        expected = np.minimum(np.maximum(left, 1), stride)
+        clock, *normal = self._random.standard_normal((1 + 2 * len(self._states), TANGENTS))
+        before, steps, sizes = self._states[:, going], self._steps[going], self._sizes[:, going]
+        stride = np.where(steps > 0, self._stride[going], np.minimum(self._stride[going], SHORTEST))
+        expected = np.minimum(np.maximum(self._starts.steps[going] - steps, 1), stride)
+        ahead = np.where(steps > 0, np.maximum(self._ahead[going], expected / 2), 0.0)
+        early = self._kicks(ahead - self._ahead[going], sizes, normal[::2])
         # a rounded time is another time, for loads that depend on it: another one at each step, whereas the
         # tangents' lasts for the stretch
-        late = self._errors.clock * np.abs(begin + self._errors.ahead) / np.sqrt(expected)
-        found, tangents, taken, reached = self._advance(going, late[:, None] * normal[0], until, stride)
-        grown = self._lengths(tangents)
-        growth = grown / np.maximum(self._far[going], 1e-300)
-        followed = np.isfinite(found).all(axis=0) & np.isfinite(tangents).all(axis=(0, 2))
+        late = self._errors.clock * np.abs(self.time[going] + self._errors.ahead) / np.sqrt(expected)
+        tangents = self._tangents[:, going] + early
+        found, grown, taken, reached = self._carried(going, tangents, late[:, None] * clock, until, stride)
+        growth = self._lengths(grown) / np.maximum(self._lengths(tangents), 1e-300)
+        followed = np.isfinite(found).all(axis=0) & np.isfinite(grown).all(axis=(0, 2))
         followed &= steps <= 4 * self._starts.steps[going] + _HOPELESS
         self.spread.whole[going[~followed]] = False
-        again = followed & (growth > _WILD) & (stride > _SHORTEST)
-        self._stride[going[again]] = np.maximum(stride[again] / 8, _SHORTEST)
-        some = np.flatnonzero(followed & ~again)
-        if not len(some):
-            return
-        going, before, found, tangents = going[some], before[:, some], found[:, some], tangents[:, some]
-        taken, reached, growth, until, stride = (x[some] for x in (taken, reached, growth, until, stride))
-        asked = self._stride[going]
-        self._stride[going] = np.where(growth < _CALM, np.minimum(2 * asked, self._most[going]), asked)
-        self._steps[going] += taken
-        self.time[going] = reached
-        sizes = np.maximum(np.abs(before), np.abs(found))
-        sizes = np.where(before != found, sizes, 0.0)  # what stands still isn't rounded
+        wild = (growth > _WILD) & (stride > self._carrier.shortest)
+        calm = np.where(growth < _CALM, np.minimum(2 * self._stride[going], self._most[going]), stride)
+        self._stride[going] = np.where(wild, np.maximum(stride / 8, self._carrier.shortest), calm)
+        # what stands still isn't rounded; of errors made all along a stretch of exponential growth g a part
+        # 1 / ln g grows as much (variances)
+        sizes = np.where(before != found, np.maximum(np.abs(before), np.abs(found)), 0.0)
+        sizes /= np.sqrt(np.clip(np.log(growth), 1.0, math.log(_WILD)))
+        grown += self._kicks(np.maximum(taken - ahead, 0.0), sizes, normal[1::2])
         if angles := self._measures.angles:  # which grow, and step control with them
             found[angles] -= self._measures.turn * np.rint(found[angles] / self._measures.turn)
-        self._states[:, going], self._tangents[:, going] = found, tangents
-        even = taken >= stride  # one that ended early will be followed by another short one
-        likely = np.where(even, self._stride[going], np.minimum(2 * taken, self._stride[going]))
-        at_end = reached >= self._starts.end[going]
-        self._perturb(going, sizes, taken, growth, np.where(at_end, 0.0, likely), normal[2:])
-        self._begin_anew(going, reached)
-        self._far[going] = self._lengths(self._tangents[:, going])
+        places = self._known.times[:, going] == reached
+        for place, motion in zip(*np.nonzero(places), strict=True):  # of the motion itself
+            found[:, motion] = self._known.states[place, :, going[motion]]
+        some = followed & ~wild
+        going = going[some]
+        self._states[:, going], self._sizes[:, going] = found[:, some], sizes[:, some]
+        self._tangents[:, going], self.time[going] = grown[:, some], reached[some]
+        self._steps[going] += taken[some]
+        self._ahead[going] = np.maximum(ahead - taken, 0.0)[some]
         self._note(going)
 
-    def _advance(
-        self, going: np.ndarray, late: np.ndarray, until: np.ndarray, stride: np.ndarray
+    def _carried(
+        self, going: np.ndarray, tangents: np.ndarray, late: np.ndarray, until: np.ndarray, stride: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Through a stretch, on whose way errors of invariants are taken back that are held."""
-        begin, states, tangents = self.time[going], self._states[:, going], self._tangents[:, going]
-        held, taken = self._held, np.zeros(len(going))
+        begin, states, held, before = self.time[going], self._states[:, going], self._held, np.zeros(1)
         if held is not None and begin[0] >= held.since:
             first = np.minimum(float(held.between), stride)
             # what errors of the time do to the invariants is taken back as soon
-            states, tangents, taken, begin = self._carrier.advance(
+            states, tangents, before, begin = self._carrier.advance(
                 going, states, tangents, late * (stride / first)[:, None], begin, until, first
             )
-            late = 0 * late
+            late, stride = 0 * late, stride - first
             if np.isfinite(states).all():
                 gradients = held.gradients(states[:, 0])
                 back, *_ = np.linalg.lstsq(gradients, gradients @ tangents[:, 0], rcond=_ALIKE)
                 tangents[:, 0] -= back
-            stride = stride - first
             if not ((begin < until) & (stride > 0)).all():
-                return states, tangents, taken, begin
-        found, moved, more, reached = self._carrier.advance(
+                return states, tangents, before, begin
+        found, grown, taken, reached = self._carrier.advance(
             going, states, tangents, late, begin, until, stride
         )
-        return found, moved, taken + more, reached
+        return found, grown, before + taken, reached
 
-    def _begin_anew(self, which: np.ndarray, reached: np.ndarray) -> None:
-        """Go on in the motions' own states where these are known."""
-        if self._known is None:
-            return
-        for motion, time in zip(which.tolist(), reached.tolist(), strict=True):
-            for place in np.flatnonzero(self._known.times[:, motion] == time).tolist():
-                self._states[:, motion] = self._known.states[place, :, motion]
-
-    def _perturb(
-        self,
-        which: np.ndarray,
-        sizes: np.ndarray,
-        taken: np.ndarray,
-        growth: np.ndarray,
-        likely: np.ndarray,
-        normal: np.ndarray,
-    ) -> None:
-        """Add errors of half of the steps taken, and of half of those likely in the next stretch, (motions,),
-        to what moves; of random numbers (states, tangents).
+    def _kicks(self, steps: np.ndarray, sizes: np.ndarray, normal: Iterable[np.ndarray]) -> np.ndarray:
+        """Errors (states, motions, tangents) of steps (motions,) in states of sizes (states, motions), by
+        random numbers (states, tangents), in epsilons.
         """
-        left = np.maximum(self._starts.steps[which] - self._steps[which], 1)
-        ahead = np.minimum(likely, left) / 2
-        steps = np.maximum(taken - self._ahead[which], 0.0) + ahead
-        self._ahead[which] = ahead
-        # of errors made all along a stretch of exponential growth g a part 1 / ln g grows as much (variances)
-        root = np.sqrt(steps / np.minimum(np.maximum(np.log(growth), 1.0), math.log(_WILD)))
-        self._add(which, self._errors.own * (root * sizes)[:, :, None] * normal[:, None])
-
-    def _add(self, which: np.ndarray, added: np.ndarray) -> None:
-        self._tangents[:, which] += np.where(self._measures.felt[:, None, None], added, 0.0)
+        kicks = self._errors.own * (np.sqrt(steps) * sizes)[:, :, None] * np.array(list(normal))[:, None]
+        return np.where(self._measures.felt[:, None, None], kicks, 0.0)
 
     def _lengths(self, tangents: np.ndarray) -> np.ndarray:
         """Length of the longest tangent (motions,) of (states, motions, tangents), internal units."""
@@ -436,14 +411,15 @@ class ErrorTangents:
 
     def _note(self, which: np.ndarray) -> None:
         states, tangents = self._states[:, which], self._tangents[:, which]
-        unit = 2.0**-24 / np.maximum(self._far[which], 1e-300)  # at which neighbours are as good as tangents
+        # at which neighbours are as good as tangents
+        unit = 2.0**-24 / np.maximum(self._lengths(tangents), 1e-300)
         found = self._measures.differences(states, unit[:, None] * tangents, self._starts, which, unit)
         self.spread.note(which, time=self.time[which], steps=self._steps[which], **found)
         lead = found["attitude" if self._measures.carried else "rates"]
-        if self._measures.places["position"]:
-            extent = self.spread.largest("distance")[which]
-            lead = np.where(found["position"] * self._epsilon > extent, lead, 0.0)
-        self._over[which] = lead
+        if "position" in found:
+            self._extent[which] = np.maximum(self._extent[which], found["distance"])
+            lead = np.where(found["position"] * self._epsilon > self._extent[which], lead, 0.0)
+        self._lead[which] = lead
 
 
 # --- what they amount to ----------------------------------------------------------------------------------
@@ -471,10 +447,6 @@ class Starts:
     steps: np.ndarray  # steps that each is expected to take, (motions,)
     rate_units: np.ndarray  # factors that bring the body rates to a common unit, (3, motions)
     parameters: np.ndarray  # of the equations, (parameters, motions)
-
-    def of(self, which: np.ndarray) -> Starts:
-        """The starts of some motions."""
-        return Starts(*(getattr(self, field.name)[..., which] for field in fields(self)))
 
 
 class Measures:
@@ -560,26 +532,21 @@ class Spread:
         whole: (motions,), False for motions that couldn't be followed to the requested end.
     """
 
-    QUANTITIES = ("time", "steps", "rates", "attitude", "position", "velocity", "distance", "speed")
-
     def __init__(self, motions: int) -> None:
         self.whole = np.ones(motions, dtype=bool)
-        self._largest = np.zeros((len(self.QUANTITIES), motions))
-        self._notes: list[tuple[np.ndarray, np.ndarray]] = []
+        self._notes: list[tuple[np.ndarray, dict[str, np.ndarray]]] = []
 
     def note(self, which: np.ndarray, **quantities: np.ndarray) -> None:
         """Note quantities of some motions."""
-        rows = np.zeros((len(self.QUANTITIES), len(which)))
-        for name, values in quantities.items():
-            rows[self.QUANTITIES.index(name)] = values
-        self._notes.append((which, rows))
-        self._largest[:, which] = np.maximum(self._largest[:, which], rows)
+        self._notes.append((which, quantities))
 
     def along(self, name: str) -> np.ndarray:
         """Values of a quantity along a single motion, (notes,)."""
-        place = self.QUANTITIES.index(name)
-        return np.array([rows[place, 0] for _, rows in self._notes])
+        return np.array([found.get(name, [0.0])[0] for which, found in self._notes if len(which)])
 
     def largest(self, name: str) -> np.ndarray:
         """Largest values so far, (motions,), zero at the start."""
-        return self._largest[self.QUANTITIES.index(name)]
+        most = np.zeros(len(self.whole))
+        for which, found in self._notes:
+            most[which] = np.maximum(most[which], found.get(name, 0.0))
+        return most

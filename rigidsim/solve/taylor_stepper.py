@@ -224,7 +224,7 @@ class TaylorStepper(Stepper):
         samples.states = states[1 - first :]
         return self._account(before, outcome, smallest, largest, taken)
 
-    def to(self, time: float) -> bool:
+    def to(self, time: Scalar) -> bool:
         """Go exactly to a time with a shortened last step: for comparisons, never for a run's samples."""
         chunks = _MOST_CHUNKS_TO
         while chunks > 0:  # Ctrl-C is heeded between chunks

@@ -216,7 +216,7 @@ def plan(
     record = samples * seconds_per_sample
     system, unused = prepared.system, unused_variables(prepared, int(steps))
     rate = float(system.rate_bound)
-    growth = growth_of(prepared, pilot.step)
+    growth = growth_of(prepared, pilot.step, corrected)
     amplification = growth.amplified(duration)
     first = LATE if prepared.holds_late else 0
     held = prepared.holds_invariants and closed is not None and steps > first

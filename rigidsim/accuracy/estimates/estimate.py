@@ -28,7 +28,8 @@ from rigidsim.model.system import System
 from rigidsim.scene.transitions import acts_at_moments_alone
 from rigidsim.solve.closed_form import ClosedForm
 from rigidsim.solve.compiled import compiled_function, evaluate_rows, interruptible
-from rigidsim.solve.effects.waypoints import SampleTrail, Waypoints
+from rigidsim.solve.corrected_stepper import CorrectedStepper
+from rigidsim.solve.effects.waypoints import SampleTrail, Waypoint, Waypoints
 from rigidsim.solve.error_tangents import (
     Carrier,
     ErrorTangents,
@@ -120,9 +121,22 @@ class _Run:
     start: float
     end: float
     steps: int
-    waypoints: Waypoints | None
-    stepper: TaylorStepper | None
+    corrected: CorrectedStepper | None
     go_on: Callable[[], bool]
+
+    @cached_property
+    def stepper(self) -> TaylorStepper | None:
+        """What took its steps, if nothing else changes states in between as its equations can't."""
+        corrected = self.corrected
+        if corrected is None or any(effect.registered and effect.rewrites for effect in corrected.effects):
+            return None
+        return corrected.stepper if isinstance(corrected.stepper, TaylorStepper) else None
+
+    @cached_property
+    def waypoints(self) -> list[Waypoint]:
+        """Boundaries of steps that it remembers."""
+        kept = None if self.corrected is None else self.corrected.effect(Waypoints)
+        return [] if kept is None else kept.between(1, self.steps)
 
     @property
     def carried(self) -> bool:
@@ -170,8 +184,8 @@ class _Run:
 
     def with_waypoints(self, samples: Samples) -> Samples:
         """Samples, and the boundaries of steps that the run remembers, in time."""
-        there = [] if self.waypoints is None else self.waypoints.between(1, self.steps)
-        places: Samples = [(0, one.time, one.state, one.chart) for one in there if one.time < self.end]
+        there = [one for one in self.waypoints if one.time < self.end]
+        places: Samples = [(0, one.time, one.state, one.chart) for one in there]
         return sorted([*samples, *places], key=lambda place: float(place[1]))
 
 
@@ -181,11 +195,12 @@ def estimate_errors(
     reached: float,
     *,
     trail: SampleTrail | None = None,
-    waypoints: Waypoints | None = None,
-    stepper: TaylorStepper | None = None,
+    corrected: CorrectedStepper | None = None,
     go_on: Callable[[], bool] = lambda: True,
 ) -> Estimate | None:
-    """Estimate the errors of a run; None if ``go_on`` ended it."""
+    """Estimate the errors of a run; None if ``go_on`` ended it. ``corrected`` is what took its steps, which
+    is used in between and put back.
+    """
     scene, epsilon = prepared.scene, float(prepared.precision.epsilon)
     if not prepared.has_steps:
         return _everywhere(prepared, CLOSED_FORM * epsilon, "a few roundings of the closed form")
@@ -194,7 +209,7 @@ def estimate_errors(
     if steps == 0 or end <= start:
         how = "the rounding of the start, which the run didn't leave"
         return _everywhere(prepared, LAST_BITS * epsilon, how)
-    run = _Run(prepared, start, end, steps, waypoints, stepper, go_on)
+    run = _Run(prepared, start, end, steps, corrected, go_on)
     samples = [] if trail is None else trail.samples
     form = closed_form_if_any(scene, driven=bool(prepared.python_loads))[0] if samples else None
     if form is not None:
@@ -436,18 +451,12 @@ def _borrowed(stepper: TaylorStepper | None) -> Iterator[None]:
 
 def _tangents_of(run: _Run, start: float, end: float) -> ErrorTangents:
     prepared, system, precision = run.prepared, run.system, run.prepared.precision
-    measures, known = Measures(system), None
-    if system.switches or run.steps < _BY_ITSELF:
-        own = run.stepper if system is prepared.system else None
-        double = replace(precision_of("double"), compact=True)
-        stepper = own or stepper_of(system, double, None, double.scalar(start))
-        carrier: Carrier = SteppedCarrier(stepper, start, end, run.steps)
-    else:
+    measures, known, carrier = Measures(system), None, _stepped(run, start, end)
+    if carrier is None:
         carrier = LaneCarrier(system, _TOLERANCE, compact=run.steps * run.part < _UNROLLED)
-        there = run.waypoints.between(1, run.steps) if run.waypoints is not None and run.regular else []
-        if there:
-            states = np.array([one.state for one in there])[:, :, None]
-            known = Known(np.ldexp([[one.time] for one in there], run.shift), states)
+        if run.regular and run.waypoints:
+            states = np.array([one.state for one in run.waypoints])[:, :, None]
+            known = Known(np.ldexp([[one.time] for one in run.waypoints], run.shift), states)
     units = [[math.ldexp(1.0, int(system.state_exponents[place]))] for place in measures.places["rates"]]
     starts = Starts(
         np.array([[float(x)] for x in system.initial]),
@@ -472,6 +481,20 @@ def _tangents_of(run: _Run, start: float, end: float) -> ErrorTangents:
         known=known,
         held=_held(run),
     )
+
+
+def _stepped(run: _Run, start: float, end: float) -> Carrier | None:
+    """What follows the motion by steps of its own; None where that costs more than code for all motions."""
+    prepared, system = run.prepared, run.system
+    if not (system.switches or run.steps < _BY_ITSELF):
+        return None
+    double = replace(precision_of("double"), compact=True)
+    near = run.stepper if system is prepared.system else None
+    near = own = near or stepper_of(system, double, None, double.scalar(start))
+    if run.regular and prepared.precision.bits > double.bits:
+        precise = replace(prepared.precision, compact=True)
+        own = run.stepper or stepper_of(prepared.system, precise, prepared.tolerance, prepared.clock.start)
+    return SteppedCarrier(own, near, start, end, run.steps)
 
 
 def _held(run: _Run) -> Held | None:

@@ -27,6 +27,7 @@ from rigidsim.accuracy.estimates.estimate import (
 from rigidsim.solve.batch.family import Family, Numbers
 from rigidsim.solve.batch.run import BatchBlock
 from rigidsim.solve.error_tangents import (
+    SHORTEST,
     TANGENTS,
     ErrorTangents,
     Known,
@@ -193,6 +194,8 @@ class MemberCarrier:
     """Carrier of members and their neighbours in lanes, all of whose stretches of as many steps go together;
     see ``Carrier``.
     """
+
+    shortest = SHORTEST
 
     def __init__(self, engine: BatchEngine, read: np.ndarray, starts: Starts) -> None:
         self._engine = engine

@@ -488,7 +488,7 @@ class SwitchingStepper(TaylorStepper):
         """Take one step, not past a surface; False if lost, or if it can't go on (``failure`` says why)."""
         return self._one()
 
-    def to(self, time: float) -> bool:
+    def to(self, time: Scalar) -> bool:
         known = self.until
         try:
             self.until = time if known is None else min(time, known)
