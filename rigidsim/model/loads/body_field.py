@@ -11,14 +11,14 @@ G M being the source's, m the body's mass, a its acceleration in flight.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.harmonics import Harmonics, Series, by_degree, by_powers, polynomial, turning
+from rigidsim.model.harmonics import Harmonics, Series, turning
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import length_text
@@ -57,72 +57,59 @@ class BodyField(ByPlacedSource):
         return self.placement.wide or self.reacts or self.pulls or self.degree > _UNROLLED
 
     def acts(self) -> bool:
-        return bool(self._series)
+        return bool(self.coefficients)
 
     @cached_property
-    def _series(self) -> list[tuple[int, Series]]:
-        """Coefficients that aren't zero (mpf), unnormalized, of each degree."""
-        return by_degree(self.field.to(self.degree))
+    def coefficients(self) -> Series:
+        """Those that aren't zero, unnormalized (mpf)."""
+        return self.field.to(self.degree)
 
     def _energy(self, m: Kinematics, place: SourcePlace, n: int) -> Any:
-        """G M m R^n over the unit of distance to the power of n + 1, internal units of energy (mpf)."""
+        """-G M m R^n over the unit of distance to the power of n + 1, internal units of energy (mpf)."""
         size = m.scene.body.mass * (self.field.radius / place.unit) ** n
-        return size * self.per_distance(m, place, 1, -m.scaling.energy)
+        return -size * self.per_distance(m, place, 1, -m.scaling.energy)
+
+    def _seen(self, m: Kinematics) -> tuple[Harmonics, SourcePlace]:
+        """Harmonics of the direction to the source in body axes, and its place."""
+        direction, place = self.source_direction(m), self.placement.seen(m)
+        return Harmonics(direction, m.number, m.scene.context), place
+
+    def _torque(self, m: Kinematics) -> list[Symbolic]:
+        """Components in body axes, internal units of energy."""
+        seen, place = self._seen(m)
+        return seen.turned(self.coefficients, lambda n: self._energy(m, place, n), place.inverse, 1)
 
     def torque(self, m: Kinematics) -> list[Term]:
-        parts = self._torque(m, self.placement.seen(m))
-        return [term for term in along_axes(m, m.scene.context.one, parts) if term[1] != hy.expression(0.0)]
-
-    def _torque(self, m: Kinematics, place: SourcePlace) -> list[Symbolic]:
-        """Components in body axes, internal units of energy."""
-        harmonics = self._harmonics(m)
-        parts: list[list[tuple[int, Symbolic]]] = [[], [], []]
-        for n, series in self._series:
-            size, vectors = -self._energy(m, place, n), turning(series, m.scene.context)
-            for axis, part in enumerate(parts):
-                along = {key: size * vector[axis] for key, vector in vectors.items()}
-                if any(c != 0 for c in along.values()):
-                    part.append((n, harmonics.summed(along)))
-        return [by_powers(part, place.inverse, 1) for part in parts]
+        terms = along_axes(m, m.scene.context.one, self._torque(m))
+        return [term for term in terms if term[1] != hy.expression(0.0)]
 
     def potential(self, m: Kinematics) -> Symbolic | None:
-        place = self.placement.seen(m)
-        return self._scalar(m, lambda n: -self._energy(m, place, n), place.inverse, 1)
+        seen, place = self._seen(m)
+        found: Symbolic = seen.scalar(
+            self.coefficients, lambda n: self._energy(m, place, n), place.inverse, 1
+        )
+        return found
 
     def acceleration(self, m: Kinematics) -> tuple[int, list[Symbolic]]:
-        context, scaling, place = m.scene.context, m.scaling, self.placement.seen(m)
-        first, ratio = (
-            self.per_distance(m, place, 2, scaling.time - scaling.speed),
-            self.field.radius / place.unit,
-        )
-        outward = self._scalar(m, lambda n: (n + 1) * first * ratio**n, place.inverse, 2)
+        context, scaling, (seen, place) = m.scene.context, m.scaling, self._seen(m)
+        first = self.per_distance(m, place, 2, scaling.time - scaling.speed)
+        ratio = self.field.radius / place.unit
+        outward = seen.scalar(self.coefficients, lambda n: (n + 1) * first * ratio**n, place.inverse, 2)
         arm = m.carried(m.scene.body.mass) * place.unit
         lever = context.ldexp(-1 / arm, scaling.energy + scaling.time - scaling.speed)
-        turned = cross(place.direction, apply(m.matrix, self._torque(m, place)))
+        turned = cross(place.direction, apply(m.matrix, self._torque(m)))
         factor = m.number(lever) * place.inverse
         return 1, [outward * u + factor * x for u, x in zip(place.direction, turned, strict=True)]
-
-    def _harmonics(self, m: Kinematics) -> Harmonics:
-        return Harmonics(self.source_direction(m), m.number, m.scene.context)
-
-    def _scalar(self, m: Kinematics, size: Callable[[int], Any], inverse: Symbolic, above: int) -> Symbolic:
-        """Sum of f_n times a constant (mpf) of each degree and ``inverse`` to the power of n + ``above``."""
-        harmonics, parts = self._harmonics(m), []
-        for n, series in self._series:
-            scaled = {key: size(n) * c for key, c in polynomial(series, m.scene.context).items()}
-            parts.append((n, harmonics.summed(scaled)))
-        return by_powers(parts, inverse, above)
 
     def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
         """Whether the field is symmetric about the axis, too."""
         context = m.scene.context
-        vectors = (x for _, series in self._series for x in turning(series, context).values())
-        return all(across(context, vector, axis) for vector in vectors)
+        return all(across(context, x, axis) for x in turning(self.coefficients, context).values())
 
     def amplitude(self, scene: Scene) -> Any:
         """Twice a bound of the potential energy at the closest approach: |P_nm|^2 <= (n + m)! / (n - m)!."""
         context, near, total = scene.context, self.placement.nearest(scene), scene.context.zero
-        for (n, m, _), value in self.field.to(self.degree).items():
+        for (n, m, _), value in self.coefficients.items():
             highest = context.sqrt(context.mpf(math.factorial(n + m)) / math.factorial(n - m))
             total += abs(value) * highest * (self.field.radius / near) ** n
         return 2 * total * self.gravitational_parameter * scene.body.mass / near

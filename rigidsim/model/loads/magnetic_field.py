@@ -14,6 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, cast
 import heyoka as hy
 from pydantic import Field, StrictInt, Tag
 
+from rigidsim.model.harmonics import TurningHarmonics
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load_words import length_text, value_text
 from rigidsim.model.loads.gravity import CentralGravity, CentralGravityFields
@@ -23,7 +24,6 @@ from rigidsim.model.placements.placement import NOWHERE, Placement
 from rigidsim.model.placements.prescribed_orbit import PlacedOnOrbit
 from rigidsim.model.rotations import Symbolic, along
 from rigidsim.model.sources import free_flight, in_body_axes, read_in
-from rigidsim.model.turning_harmonics import TurningHarmonics
 from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.arithmetic import Vector, apply, dot, norm, transpose
 from rigidsim.scene.bodies.presets import EARTH
@@ -240,8 +240,7 @@ class EarthField(DipoleField):
         if which not in m.made:
             place = self.placement.seen(m)
             ratio = self.harmonics.radius / place.unit
-            seen = place.line, place.inverse
-            m.made[which] = self.harmonics.vector(m, seen, lambda n: ratio ** (n + 2) / size)
+            m.made[which] = self.harmonics.vector(m, place, lambda n: ratio ** (n + 2) / size)
         return m.made[which]
 
     def at_start(self, scene: Scene) -> Vector:

@@ -17,12 +17,12 @@ from typing import Any
 
 from pydantic import Field, StrictStr
 
+from rigidsim.model.harmonics import TurningHarmonics, frame_of
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load
 from rigidsim.model.loads.attraction import Attraction, ByPlacedSource
 from rigidsim.model.loads.source_figure import refuse_inside
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.turning_harmonics import TurningHarmonics, frame_of
 from rigidsim.scene.bodies.gravity_field import HarmonicsTable
 from rigidsim.scene.effect_parts import EffectPart, degree_parts
 from rigidsim.scene.exact import ZERO
@@ -75,12 +75,12 @@ class SourceField(ByPlacedSource):
         place = self.placement.seen(m)
         strength, ratio = self.per_distance(m, place, 1, -m.scaling.energy), self.field.radius / place.unit
         strength = -strength * m.carried(m.scene.body.mass)
-        return self.field.scalar(m, (place.line, place.inverse), lambda n: strength * ratio**n)
+        return self.field.scalar(m, place, lambda n: strength * ratio**n)
 
     def acceleration(self, m: Kinematics) -> tuple[int, list[Symbolic]]:
         place, shift = self.placement.seen(m), m.scaling.time - m.scaling.speed
         strength, ratio = -self.per_distance(m, place, 2, shift), self.field.radius / place.unit
-        return 1, self.field.vector(m, (place.line, place.inverse), lambda n: strength * ratio**n)
+        return 1, self.field.vector(m, place, lambda n: strength * ratio**n)
 
     def amplitude(self, scene: Scene) -> Any:
         return scene.context.zero  # no torque

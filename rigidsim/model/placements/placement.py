@@ -75,6 +75,11 @@ class SourcePlace:
         """Unit vector towards it."""
         return [-x for x in self.line] if self.outward else self.line
 
+    @property
+    def outwards(self) -> list[Symbolic]:
+        """Unit vector away from it."""
+        return self.line if self.outward else [-x for x in self.line]
+
 
 class Placement:
     """How a source is placed; vectors in space axes.
