@@ -20,9 +20,8 @@ from experiments.common import Answer, Check, Curve, Panel, Picture, Study
 from experiments.coverage.judging import angle, apart, compactly, gone_through
 from experiments.coverage.sweep_kinds import KINDS
 from rigidsim.scene.config import Experiment
-from rigidsim.session.members import warning_bits
 from rigidsim.solve.status import Status
-from rigidsim.workflows.sweeps.members import run_members
+from rigidsim.workflows.sweeps.members import run_members, warning_bits
 
 _MEMBERS, _SEED = 60, 1
 _CHEAP, _FEW_MEMBERS = ("free, short", "planar", "tops", "driven", "flights"), 8

@@ -14,8 +14,8 @@ from experiments.coverage.families import SAMPLES, CoverageScene
 from rigidsim.errors import ConfigError
 from rigidsim.scene.cautions import WarningCode
 from rigidsim.scene.config import Experiment
-from rigidsim.session.diagnostics import Diagnostics
-from rigidsim.session.recorder import SampleStatistics
+from rigidsim.session.execution import Diagnostics
+from rigidsim.session.session import SampleStatistics
 from rigidsim.solve.assembly import Assembly, assemble
 from rigidsim.solve.effects.waypoints import SampleTrail
 from rigidsim.solve.problem import InitialValueProblem, prepare

@@ -24,8 +24,7 @@ from typing import Any
 from experiments.durability.judging import Tally
 from experiments.durability.scenes import same
 from rigidsim.errors import RigidsimError
-from rigidsim.store.sweeps.folder import SweepFolder
-from rigidsim.store.sweeps.run import open_sweep
+from rigidsim.store.sweeps.folder import SweepFolder, open_sweep
 from rigidsim.store.sweeps.tiles import read_tile
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweeps.sweep import resume_sweep, sweep

@@ -17,7 +17,7 @@ from experiments.extremes.scenes import Extreme, Way
 from rigidsim.accuracy.error_law import round_off_law
 from rigidsim.errors import ConfigError
 from rigidsim.scene.cautions import WarningCode
-from rigidsim.session.diagnostics import Diagnostics
+from rigidsim.session.execution import Diagnostics
 from rigidsim.solve.closed_form import ClosedForm, NoClosedForm, closed_form_of
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.status import Status

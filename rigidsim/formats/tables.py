@@ -20,7 +20,7 @@ import xarray
 from rigidsim.formats.digits import RADIAN, converted
 from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.scene.readable import AngleUnit
-from rigidsim.store.sweeps.dataset import boxes
+from rigidsim.store.sweeps.tiles import boxes
 from rigidsim.store.variables import LABELS
 
 BLOCK_NUMBERS = 1 << 21  # 16 MB

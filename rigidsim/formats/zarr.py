@@ -12,7 +12,7 @@ from rigidsim.formats.tables import Table
 from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.scene.readable import AngleUnit
 from rigidsim.store.netcdf import CHUNK_ROWS
-from rigidsim.store.sweeps.dataset import chunk_shape
+from rigidsim.store.sweeps.tiles import chunk_shape
 
 BLOCK_ROWS = 8 * CHUNK_ROWS
 _SLAB_BLOCKS = 8  # 128 MB at once: each is an append

@@ -15,8 +15,7 @@ from rigidsim.scene.arithmetic import working_bits
 from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.store.outputs import FILE, refuse_loss, writing
 from rigidsim.store.run import SavedRun, open_run
-from rigidsim.store.sweeps.folder import is_sweep
-from rigidsim.store.sweeps.run import SavedSweep, open_sweep
+from rigidsim.store.sweeps.folder import SavedSweep, is_sweep, open_sweep
 from rigidsim.workflows.again import MotionAgain
 from rigidsim.workflows.read import parse
 

@@ -18,7 +18,7 @@ from rigidsim.accuracy.motion import growth_of
 from rigidsim.model.equation_text import equation_texts
 from rigidsim.model.load import Load
 from rigidsim.session.dataset import dataset_variables, refuse_taken_names, unused_variables
-from rigidsim.session.storage import storage
+from rigidsim.session.session import storage
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, told_loads
 from rigidsim.solve.assembly import Assembly, assemble
 from rigidsim.solve.problem import InitialValueProblem, prepare

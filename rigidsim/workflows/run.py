@@ -15,8 +15,7 @@ from rigidsim.scene.choices import AUTO, FULL
 from rigidsim.session.dataset import refuse_taken_names
 from rigidsim.session.execution import execute
 from rigidsim.session.progress import watched
-from rigidsim.session.session import Observer, Session, Tuning
-from rigidsim.session.storage import refuse_too_large, refuse_too_large_for_memory
+from rigidsim.session.session import Observer, Session, Tuning, refuse_too_large, refuse_too_large_for_memory
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.status import Status
 from rigidsim.store.folder import RunFolder

@@ -14,8 +14,7 @@ from rigidsim.store import pictures
 from rigidsim.store.fits import is_fit
 from rigidsim.store.pictures import Told
 from rigidsim.store.run import Run, SavedRun, open_run
-from rigidsim.store.sweeps.folder import is_sweep
-from rigidsim.store.sweeps.run import open_sweep
+from rigidsim.store.sweeps.folder import is_sweep, open_sweep
 from rigidsim.workflows.compare.as_run import open_any
 from rigidsim.workflows.fit.fitting import FitFolder
 from rigidsim.workflows.fit.result import fitted_run

@@ -10,7 +10,7 @@ import pytest
 import rigidsim
 from rigidsim.errors import RigidsimError
 from rigidsim.look.figures.sweeps import sweep_figure
-from rigidsim.store.sweeps.run import open_sweep
+from rigidsim.store.sweeps.folder import open_sweep
 from rigidsim.workflows.sweeps.members import single_member
 from rigidsim.workflows.sweeps.sweep import resume_sweep
 from rigidsim.workflows.sweeps.verify import verify_sweep

@@ -16,8 +16,7 @@ from rigidsim.look.figures.spectrum import save_spectrum
 from rigidsim.look.figures.sweeps import drawable, save_sweep_figure
 from rigidsim.store.outputs import ANALYSIS, refuse_loss, writing
 from rigidsim.store.run import SavedRun, ShownRun, open_run
-from rigidsim.store.sweeps.folder import is_sweep
-from rigidsim.store.sweeps.run import SavedSweep, open_sweep
+from rigidsim.store.sweeps.folder import SavedSweep, is_sweep, open_sweep
 from rigidsim.workflows.compare.as_run import open_any
 from rigidsim.workflows.view import render, runs_of, show
 

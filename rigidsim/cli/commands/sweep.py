@@ -15,8 +15,7 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.sweeps.values import scanned
 from rigidsim.session.progress import meter, watched
 from rigidsim.store.fits import is_fit
-from rigidsim.store.sweeps.folder import is_sweep
-from rigidsim.store.sweeps.run import SavedSweep, open_sweep
+from rigidsim.store.sweeps.folder import SavedSweep, is_sweep, open_sweep
 from rigidsim.workflows.read import load
 from rigidsim.workflows.sweeps.verify import MEMBERS, verify_sweep
 

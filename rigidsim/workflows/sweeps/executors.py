@@ -1,4 +1,4 @@
-"""Executors that compute tiles: processes of this machine, or the workers of a Dask cluster.
+"""Computing tiles: in this process, in others of this machine, or by the workers of a Dask cluster.
 
 No bit depends on which is used. A worker process that dies ends the session, and all tiles that are complete
 stay. Dask computes the tiles of a worker that died with others.
@@ -9,17 +9,74 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rigidsim.errors import RigidsimError, StoppedError, Wording
+from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.solve.compiled import quieten_engine
+from rigidsim.store import atomic, provenance
+from rigidsim.store.sweeps.tiles import Tile, plain
+from rigidsim.workflows.sweeps.members import MemberResults, kernel_of_members, run_members, sweep_of
 
 _LOOK_SECONDS = 0.5
+
+
+def results_of(
+    sweep: Sweep, members: Sequence[int], keep: Sequence[str], alone: bool | None, data: Path
+) -> MemberResults:
+    """Run or fit some members, see ``run_members``; ``data``: the folder of what they are fitted to."""
+    if not sweep.fits:
+        return run_members(sweep, members, keep, alone)
+    from rigidsim.workflows.sweeps.fits import fit_members  # which few sweeps need
+
+    return fit_members(sweep, members, data)
+
+
+def tile_image(
+    config: str, source: str, members: np.ndarray, keys: np.ndarray, items: tuple[str, ...],
+    alone: bool | None, data: str,
+) -> bytes:  # fmt: skip
+    """Run members of a sweep's config and keep items (``items_of``): the sealed file of their tile; ``data``:
+    the folder of what members are fitted to.
+    """
+    began, cpu = time.perf_counter(), time.process_time()
+    results = results_of(
+        sweep_of(config, source), members.tolist(), [plain(item) for item in items], alone, Path(data)
+    )
+    made = {
+        "engines": dict(results.engines),
+        "why_alone": results.why_alone,
+        "estimate_cpu_seconds": results.estimating,
+        "wall_seconds": time.perf_counter() - began,
+        "cpu_seconds": time.process_time() - cpu,
+        "finished_at": provenance.now(),
+        "cpu_model": provenance.cpu_model(),
+        **{f"version_{name}": version for name, version in provenance.versions().items()},
+        **kernel_of_members(config, source),
+    }
+    return Tile(keys, items, results.kept, results.reasons, made).image()
+
+
+def leave_tile(path: Path, *task: Any) -> None:
+    """Compute a tile (see ``tile_image``); on return it is saved.
+
+    A worker sends no long answer: what was half written into the pipe of its pool when it was killed would be
+    waited for, for ever.
+    """
+    atomic.write_bytes(path, tile_image(*task))
+
+
+def sent_tile(path: Path, *task: Any) -> bytes:
+    """Compute a tile for whoever sees the folder."""
+    return tile_image(*task)
 
 
 @dataclass(frozen=True)

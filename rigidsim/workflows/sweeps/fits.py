@@ -16,14 +16,14 @@ import numpy as np
 from rigidsim.errors import FORCE, SWEEP, ConfigError, RigidsimError, RunFolderError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.sweeps.sweep import FITS, Sweep
-from rigidsim.session.members import OUTCOMES, MemberResults, Outcome, naming_member, status_variable
 from rigidsim.solve.status import Status
 from rigidsim.store import atomic
-from rigidsim.store.sweeps.run import FittedOfMembers
+from rigidsim.store.sweeps.folder import FittedOfMembers
 from rigidsim.store.sweeps.tiles import Kept, KeptVariable
 from rigidsim.workflows.fit.fitting import fit_to
 from rigidsim.workflows.fit.observations import DataFiles, content, digest
 from rigidsim.workflows.fit.result import FitResult
+from rigidsim.workflows.sweeps.members import OUTCOMES, MemberResults, Outcome, naming_member, status_variable
 
 _NUMBERS = {
     "chi_square": "sum of squares of residuals in sigmas, with the priors'",

@@ -1,31 +1,713 @@
-"""Computing members of a sweep tile by tile: in batches if possible, otherwise one by one."""
+"""Members of a sweep: what is kept of each, run in batches if possible, otherwise one by one, in tiles."""
 
+import math
 import re
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from functools import lru_cache, partial
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from functools import cached_property, lru_cache, partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rigidsim.accuracy.estimates.members import MemberErrors, MemberEstimates
 from rigidsim.errors import ConfigError, MemberError, Problem, RigidsimError
 from rigidsim.model.tangents import GROWTH
+from rigidsim.scene.cautions import WarningCode
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.parts_of_values import part_name
 from rigidsim.scene.scene import build_scene
 from rigidsim.scene.sweep_table import INDICATORS
-from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.session.dataset import kernel_attributes
-from rigidsim.session.members import MemberResults, naming_member, run_alone
+from rigidsim.scene.sweeps.sweep import FITS, Sweep
+from rigidsim.session.dataset import dataset_variables, kernel_attributes
+from rigidsim.solve.batch.family import (
+    AxisNumbers,
+    Families,
+    Family,
+    Members,
+    NotBatchable,
+    Sorted,
+    batchable,
+)
+from rigidsim.solve.batch.run import BatchBlock, BatchRun
+from rigidsim.solve.indicators import indicators
 from rigidsim.solve.problem import prepare
-from rigidsim.store import provenance
+from rigidsim.solve.status import Status
+from rigidsim.store.netcdf import joined_parts
 from rigidsim.store.run import MemoryRun
-from rigidsim.store.sweeps.tiles import Kept, KeptVariable, Tile, plain
+from rigidsim.store.summary import Summary
+from rigidsim.store.summary_parts import Modelling
+from rigidsim.store.sweeps.tiles import ALWAYS, Kept, KeptVariable
+from rigidsim.store.variables import Variable
 from rigidsim.workflows.analyse import analyse
 from rigidsim.workflows.read import parse, reads_kernels, refuse_others
 from rigidsim.workflows.run import run
-from rigidsim.workflows.sweeps.batch import BatchTiles, Part, why_alone
+
+
+def kept(
+    values: np.ndarray,
+    units: str,
+    long_name: str,
+    item: str = ALWAYS,
+    dims: tuple[str, ...] = (),
+    **more: Any,
+) -> KeptVariable:
+    """A kept variable with its labels."""
+    return KeptVariable(dims, values, {"units": units, "long_name": long_name, **more}, item)
+
+
+@dataclass(frozen=True)
+class MemberSeries:
+    """Samples of some members: parts of (members, samples, components); missing ones at the end are nan."""
+
+    variable: Variable
+    parts: Sequence[np.ndarray]
+
+    def shaped(self, values: np.ndarray) -> np.ndarray:
+        """Values (members, components) or (members, samples, components) in the variable's own shape."""
+        return values.reshape(*values.shape[:-1], *self.variable.shape)
+
+    @property
+    def drift_of(self) -> str | None:
+        """The invariant whose drift this variable is; None for any other variable."""
+        return self.variable.attributes.get("drift_of")
+
+
+def kept_of_series(
+    series: Sequence[MemberSeries],
+    times: np.ndarray,
+    lengths: np.ndarray,
+    keep: Collection[str],
+    hidden: str = "",
+) -> Kept:
+    """What is asked for of recorded variables; drifts are always kept. Times in s are (samples,), or
+    (members, samples) if each has its own; ``lengths``: samples that each member has; ``hidden``: what is
+    recorded only for indicators.
+    """
+    found: Kept = {}
+    for one in series:
+        if one.variable.name == GROWTH:
+            found |= _indicators(one, times, keep)
+    series = [one for one in series if one.variable.name != hidden]
+    for one in series:
+        if one.drift_of is not None:
+            found |= _drifts(one, lengths)
+            continue
+        if "put_back_of" in one.variable.attributes:
+            continue
+        if "final" in keep:
+            found |= _final(one, lengths)
+        if "extremes" in keep:
+            found |= _extremes(one, times)
+        if "means" in keep:
+            found |= _means(one)
+    if "series" in keep:
+        found |= _series(series, times)
+    return found
+
+
+def _indicators(one: MemberSeries, times: np.ndarray, keep: Collection[str]) -> Kept:
+    """Chaos indicators from the growth of a tangent vector."""
+    since = times if times.ndim == 1 else times.T
+    way = -1.0 if since.size and (since[-1] < since[0]).any() else 1.0  # growth is that along the run
+    told = indicators(way * since, one.parts[0][:, :, 0].T)
+    labels = {
+        "megno": ("1", "mean exponential growth of nearby orbits: 2 for regular motion", told.megno),
+        "fli": ("1", "fast Lyapunov indicator: largest logarithm of the growth", told.fli),
+        "lyapunov": ("s-1", "largest Lyapunov exponent, as far as the samples reach", told.largest_exponent),
+    }
+    found: Kept = {}
+    for name, (units, long_name, values) in labels.items():
+        if name in keep:
+            found[name] = kept(values, units, long_name, name)
+            until = "time up to which the growth of a tangent vector is known"
+            found["growth_time"] = kept(way * told.until, "s", until, name)
+    return found
+
+
+def _last(values: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Last sample of each member from (members, samples, components), nan if it has none."""
+    rows = np.maximum(lengths - 1, 0)
+    last = values[np.arange(len(values)), rows]
+    return np.where((lengths > 0)[:, None], last, np.nan)
+
+
+def _final(one: MemberSeries, lengths: np.ndarray) -> Kept:
+    variable = one.variable
+    name = f"{variable.name}_final"
+    found = {}
+    for part, values in enumerate(one.parts):
+        attributes = variable.part_attributes(part)
+        if part:
+            attributes |= {"residual_of": name}
+        attributes.pop("exact_value", None)
+        attributes["long_name"] = f"{attributes.get('long_name', variable.name)}, at the last sample"
+        attributes.pop("coordinates", None)
+        found[part_name(name, part)] = KeptVariable(
+            variable.dims, one.shaped(_last(values, lengths)), attributes, "final"
+        )
+    return found
+
+
+def _extremes(one: MemberSeries, times: np.ndarray) -> Kept:
+    variable, values = one.variable, one.parts[0]
+    found = {}
+    units = variable.attributes.get("units", "1")
+    for what, filled, place in (("min", np.inf, np.argmin), ("max", -np.inf, np.argmax)):
+        rows = place(np.where(np.isnan(values), filled, values), axis=1)
+        extreme = np.take_along_axis(values, rows[:, None, :], axis=1)[:, 0]
+        when = times[rows] if times.ndim == 1 else np.take_along_axis(times, rows, axis=1)
+        when = np.where(np.isnan(extreme), np.nan, when)
+        words = "smallest" if what == "min" else "largest"
+        long_name = f"{words} {variable.attributes.get('long_name', variable.name)} at a sample"
+        common = {k: v for k, v in variable.attributes.items() if k in ("frame", "euler_sequence", "angle")}
+        found[f"{variable.name}_{what}"] = kept(
+            one.shaped(extreme), units, long_name, "extremes", variable.dims, **common
+        )
+        found[f"{variable.name}_{what}_time"] = kept(
+            one.shaped(when), "s", f"time of the {long_name}", "extremes", variable.dims
+        )
+    return found
+
+
+def _means(one: MemberSeries) -> Kept:
+    variable = one.variable
+    present = ~np.isnan(one.parts[0])
+    count = np.maximum(present.sum(axis=1), 1)
+    # in the order of the samples: ``sum`` takes another order if a member is alone in its block
+    total = sum(np.cumsum(np.where(present, part, 0), axis=1)[:, -1] for part in reversed(one.parts))
+    mean = np.where(present.any(axis=1), total / count, np.nan)
+    units = variable.attributes.get("units", "1")
+    long_name = f"mean of the {variable.attributes.get('long_name', variable.name)} over the samples"
+    return {f"{variable.name}_mean": kept(one.shaped(mean), units, long_name, "means", variable.dims)}
+
+
+def _drifts(one: MemberSeries, lengths: np.ndarray) -> Kept:
+    values = one.parts[0]
+    size = np.abs(values[:, :, 0])
+    largest = np.where(lengths > 0, np.fmax.reduce(size, axis=1, initial=0.0), np.nan)
+    of_a_member = ("coordinates", "scale", "scale_units")
+    attributes = {k: v for k, v in one.variable.attributes.items() if k not in of_a_member}
+    named = one.variable.attributes.get("long_name", one.variable.name)
+    return {
+        f"{one.variable.name}_largest": KeptVariable(
+            (), largest, {**attributes, "long_name": f"largest {named} at a sample, without its sign"}
+        ),
+        f"{one.variable.name}_final": KeptVariable(
+            (), _last(values, lengths)[:, 0], {**attributes, "long_name": f"{named} at the last sample"}
+        ),
+    }
+
+
+def _series(series: Sequence[MemberSeries], times: np.ndarray) -> Kept:
+    found: Kept = {}
+    for one in series:
+        for part, values in enumerate(one.parts):
+            attributes = {k: v for k, v in one.variable.part_attributes(part).items() if k != "coordinates"}
+            found[part_name(one.variable.name, part)] = KeptVariable(
+                ("sample", *one.variable.dims), one.shaped(values), attributes, "series"
+            )
+    rows = np.broadcast_to(times, (len(next(iter(found.values())).values), times.shape[-1]))
+    found["time"] = kept(np.array(rows), "s", "time of the scene", "series", ("sample",))
+    return found
+
+
+Points = Mapping[str, tuple[Variable, Sequence[np.ndarray]]]
+"""Values recorded at events by name: for each member (times, ...)."""
+
+
+def kept_events(
+    name: str, times: Sequence[np.ndarray], most: int, points: Points, keep: Collection[str]
+) -> Kept:
+    """How often an event happened and when (s); only the first times that fit are kept."""
+    count = len(times)
+    found: Kept = {}
+    along, first_times = (f"{name}_occurrence",), f"times of {name}, the first {most}"
+    table = _padded(times, most, ())
+    if "events" in keep:
+        counts = np.array([len(t) for t in times], dtype=np.int64)
+        found[f"{name}_count"] = kept(counts, "1", f"how often {name} happened", "events")
+        found[f"{name}_times"] = kept(table, "s", first_times, "events", along)
+        first = table[:, 0] if most else np.full(count, np.nan)
+        found[f"{name}_first"] = kept(first, "s", f"first time of {name}", "events")
+    if "section" in keep:
+        for what, (variable, values) in points.items():
+            labels = {k: v for k, v in variable.attributes.items() if k in ("units", "frame", "angle")}
+            labels["long_name"] = f"{variable.attributes.get('long_name', what)} at {name}"
+            padded = _padded(values, most, variable.shape)
+            found[f"{name}_{what}"] = KeptVariable((*along, *variable.dims), padded, labels, "section")
+        found[f"{name}_time"] = kept(table, "s", first_times, "section", along)
+    return found
+
+
+def _padded(rows: Sequence[np.ndarray], most: int, shape: tuple[int, ...]) -> np.ndarray:
+    table = np.full((len(rows), most, *shape), np.nan)
+    for row, values in zip(table, rows, strict=True):
+        taken = values[:most]
+        row[: len(taken)] = np.reshape(taken, (-1, *shape))
+    return table
+
+
+def assembled(parts: Sequence[tuple[np.ndarray, Kept]], count: int) -> Kept:
+    """Groups of members, each at its places, as one; nan (0 for counts) where a group lacks a variable."""
+    found: Kept = {}
+    for name in dict.fromkeys(name for _, part in parts for name in part):
+        held = [(places, part[name]) for places, part in parts if name in part]
+        like = held[0][1]
+        shape = np.max([one.values.shape[1:] for _, one in held], axis=0).astype(int)
+        lacking = 0 if like.values.dtype.kind == "i" else np.nan
+        table = np.full((count, *shape), lacking, dtype=like.values.dtype)
+        for places, one in held:
+            there: tuple[Any, ...] = (places, *(slice(0, size) for size in one.values.shape[1:]))
+            table[there] = one.values
+        found[name] = replace(like, values=table)
+    return found
+
+
+class Outcome(Enum):
+    """How a member ended that has no status of a run."""
+
+    REFUSED = "refused"
+    FAILED = "failed"
+
+
+ENDED_WELL = (Status.FINISHED.value, Status.EVENT.value)
+OUTCOMES = (
+    *(s.value for s in (Status.FINISHED, Status.EVENT, Status.WALL_TIME, Status.MAX_STEPS, Status.MAX_DRIFT)),
+    *(s.value for s in (Status.NON_FINITE, Status.COLLAPSED, Status.UNRESOLVED, *Outcome, Status.IMPOSSIBLE)),
+    Status.OUT_OF_RANGE.value,
+)
+"""All outcomes of members; a dataset stores the index in this list, which may only grow."""
+WARNINGS = tuple(code.value for code in WarningCode)
+_DATES = ("year", "julian_date", "date")
+_ESTIMATING = ("estimate", "modelling")
+"""Phases of a run that find its errors."""
+
+
+@dataclass(frozen=True)
+class MemberResults:
+    """Results of some members: kept variables, (members, ...) each; members by engine; the code of the reason
+    why some were run one by one, empty if none was; and CPU seconds spent on error estimates.
+    """
+
+    kept: Kept
+    reasons: Mapping[int, str]
+    engines: Mapping[str, int] = field(default_factory=dict)
+    why_alone: str = ""
+    estimating: float = 0.0
+
+    @classmethod
+    def together(cls, parts: "Sequence[tuple[np.ndarray, MemberResults]]", why: str = "") -> "MemberResults":
+        """Groups of members as one, each with the places of its members."""
+        reasons = {int(places[row]): text for places, one in parts for row, text in one.reasons.items()}
+        engines: Counter[str] = Counter()
+        for _, one in parts:
+            engines.update(one.engines)
+        kept = assembled([(places, one.kept) for places, one in parts], sum(len(p) for p, _ in parts))
+        return cls(kept, reasons, engines, why, sum(one.estimating for _, one in parts))
+
+
+def status_variable(codes: np.ndarray) -> KeptVariable:
+    """Outcomes of members as indices in ``OUTCOMES``, with their meanings."""
+    meanings = " ".join(re.sub(r"\W+", "_", outcome) for outcome in OUTCOMES)
+    flags = {"flag_values": list(range(len(OUTCOMES))), "flag_meanings": meanings}
+    return KeptVariable((), codes, {"long_name": "how the member ended", **flags})
+
+
+def warning_bits(codes: Iterable[str]) -> int:
+    """Warnings of one member as a mask, one bit for each kind."""
+    return sum(1 << WARNINGS.index(code) for code in set(codes))
+
+
+def warnings_variable(bits: np.ndarray) -> KeptVariable:
+    """Warnings of members, each a mask as in ``warning_bits``."""
+    attributes = {
+        "long_name": "warnings of the member, a bit each",
+        "flag_masks": [1 << bit for bit in range(len(WARNINGS))],
+        "flag_meanings": " ".join(WARNINGS),
+    }
+    return KeptVariable((), bits, attributes)
+
+
+def plain_variables(
+    *,
+    steps: np.ndarray,
+    reached: np.ndarray,
+    bound: np.ndarray,
+    attitude_error: np.ndarray | None,
+    position_error: np.ndarray | None = None,
+    modelling: Modelling | None = None,
+) -> Kept:
+    """Variables that every member has besides its status, (members,) each; None for errors that aren't
+    estimated, and for the position of a body without one.
+    """
+    unknown = np.full(len(steps), np.nan)
+    found = {
+        "steps": kept(steps.astype(np.int64), "1", "steps taken"),
+        "time_reached": kept(reached, "s", "time of the last sample"),
+        "drift_bound": kept(bound, "1", "relative drift that rounding alone explains"),
+        "attitude_error": kept(
+            unknown if attitude_error is None else attitude_error,
+            "rad",
+            "estimated error of the attitude at the last sample; nan where none is estimated",
+        ),
+    }
+    if position_error is not None:
+        told = "estimated error of the position at the last sample"
+        found["position_error"] = kept(position_error, "m", told)
+    if modelling is not None:
+        errors = {
+            "modelling_error": (modelling.worst, "directions", "rad"),
+            "modelling_error_norm": (modelling.angular_momentum_norm, "angular_momentum_norm, relative", "1"),
+            "modelling_error_energy": (modelling.energy, "energy of rotation, relative", "1"),
+        }
+        for name, (error, what, units) in errors.items():
+            if error is not None or name == "modelling_error":
+                value = np.array([np.nan if error is None else error])
+                told = f"largest error of the averaged model's {what} until the end"
+                found[name] = kept(value, units, told)
+    return found
+
+
+@contextmanager
+def naming_member(member: int) -> Iterator[None]:
+    """Add a member's number to the traceback of an error of the code."""
+    try:
+        yield
+    except Exception as error:
+        error.add_note(f"in member {member} of the sweep")
+        raise
+
+
+def run_alone(
+    run: Callable[[], MemoryRun],
+    keep: Sequence[str],
+    most_events: int,
+    events: Sequence[str],
+    more: Callable[[MemoryRun], Kept] | None = None,
+    hidden: str = "",
+) -> MemberResults:
+    """Run one member by itself; a refusal or failure is recorded, and errors of the code are raised."""
+    try:
+        result = run()
+    except ConfigError as error:
+        return failed(Outcome.REFUSED, "; ".join(str(problem) for problem in error.problems))
+    except RigidsimError as error:
+        return failed(Outcome.FAILED, str(error))
+    summary = result.outcome
+    assert isinstance(summary, Summary)
+    if summary.status == Status.INTERRUPTED.value:
+        raise KeyboardInterrupt
+    results = _kept_of_run(result, keep, hidden) | _events_of_run(result, keep, most_events, events)
+    bounds = [row.bound for row in summary.invariants.values()]
+    error_at_end = summary.accuracy.estimated_attitude_error
+    if summary.accuracy.certified is not None:
+        error_at_end = summary.accuracy.certified
+    results |= _ended(summary.status, summary.warning_codes)
+    placed = summary.accuracy.estimated_position_error
+    results |= plain_variables(
+        steps=np.array([summary.cost.steps]),
+        reached=np.array([summary.time_reached]),
+        bound=np.array([max(bounds, default=np.nan)]),
+        attitude_error=None if error_at_end is None else np.array([error_at_end]),
+        position_error=None if placed is None else np.array([placed]),
+        modelling=summary.modelling,
+    )
+    if more is not None and result.blocks:
+        results |= more(result)
+    reasons = {} if summary.status in ENDED_WELL else {0: summary.message}
+    spent = sum(summary.cost.cpu_by_phase.get(phase, 0.0) for phase in _ESTIMATING)
+    return MemberResults(results, reasons, {"alone": 1}, estimating=spent)
+
+
+def _ended(status: str, warnings: Iterable[str]) -> Kept:
+    """Status and warnings of a single member."""
+    return {
+        "status": status_variable(np.array([OUTCOMES.index(status)], dtype=np.int64)),
+        "warnings": warnings_variable(np.array([warning_bits(warnings)], dtype=np.int64)),
+    }
+
+
+def failed(outcome: Outcome, reason: str) -> MemberResults:
+    """Results of a member that gave no samples."""
+    nothing = np.array([np.nan])
+    found = _ended(outcome.value, [])
+    found |= plain_variables(steps=np.array([0]), reached=nothing, bound=nothing, attitude_error=nothing)
+    return MemberResults(found, {0: reason}, {"alone": 1})
+
+
+def _kept_of_run(result: MemoryRun, keep: Sequence[str], hidden: str) -> Kept:
+    if not result.blocks:
+        return {}
+    series, times = [], np.zeros(0)
+    for variable in result.variables:
+        if variable.name == "time":
+            times = np.reshape(joined_parts(result.blocks, variable)[0], -1)
+        if variable.name == "time" or "units" not in variable.attributes or variable.name in _DATES:
+            continue
+        parts = [
+            part.reshape(1, -1, max(1, int(np.prod(variable.shape))))
+            for part in joined_parts(result.blocks, variable)
+        ]
+        series.append(MemberSeries(variable, parts))
+    return kept_of_series(series, times, np.array([len(times)]), keep, hidden)
+
+
+def _events_of_run(result: MemoryRun, keep: Sequence[str], most_events: int, events: Sequence[str]) -> Kept:
+    found: Kept = {}
+    recorded = {v.name: v for v in result.variables if "drift_of" not in v.attributes and v.name != "time"}
+    for name in events:
+        extras = {extra.name: extra for extra in result.extras}
+        times = extras[f"{name}_time"].values
+        points = {
+            what: (variable, [extras[f"{name}_{what}"].values])
+            for what, variable in recorded.items()
+            if f"{name}_{what}" in extras and variable.name not in _DATES
+        }
+        found |= kept_events(name, [times], most_events, points, keep)
+    return found
+
+
+_ONE_BY_ONE = ("frequencies",)
+"""Items that only single runs can provide."""
+_LOOKED_AT, _COUNTED = 64, 4096  # members by which a sweep is judged, by their equations and by their kinds
+_MOST_KINDS, _LEAST_MEMBERS = 64, 8
+"""Up to so many kinds of members have batches however few members they have; more need so many each."""
+_MOST_AHEAD = 4  # families compiled before the first tile
+_MOST_HELD = 256  # families
+_MOST_UNTRACED = 8
+"""Members that can't be traced after which a check leaves the others to their runs: each takes as long."""
+
+
+Part = tuple[np.ndarray, MemberResults]
+"""Results of some of a tile's members, with their places among them."""
+
+
+def why_alone(sweep: Sweep, keep: Sequence[str]) -> str:
+    """Code of the reason why no member of a sweep can run in a batch; empty if some may."""
+    if sweep.fits:
+        return FITS
+    for item in _ONE_BY_ONE:
+        if item in keep:
+            return item
+    if not sweep.table.batch:
+        return "asked"
+    timed = sweep.base.config.limits.wall_time is not None
+    if timed or any(axis.key == "limits.wall_time" for axis in sweep.axes):
+        return "wall_time"
+    reason = batchable(sweep.base, [])
+    return "" if reason is None else reason.name.lower()
+
+
+@dataclass(frozen=True)
+class _FamilyRun:
+    """What is compiled for a family, and the variables that its members record."""
+
+    family: Family
+    run: BatchRun
+    variables: list[Variable]
+
+    @cached_property
+    def estimates(self) -> MemberEstimates:
+        """Estimates of its members' errors."""
+        return MemberEstimates(self.family, self.run.width)
+
+
+class BatchTiles:
+    """Families of a sweep, traced and compiled once per process."""
+
+    def __init__(self, sweep: Sweep) -> None:
+        self._sweep = sweep
+        self.axes = AxisNumbers(sweep)
+        self._known: list[Family] = []
+        self._runs: dict[int, _FamilyRun] = {}
+
+    @cached_property
+    def alone(self) -> NotBatchable | None:
+        """Why all members run one by one, if too few could share a batch; None if they don't.
+
+        It is judged by the config alone: who runs in a batch must not depend on which members a process has
+        met before, since single runs have other last bits.
+        """
+        kinds, looked_at = self._kinds()
+        if kinds > _MOST_KINDS and kinds * _LEAST_MEMBERS > looked_at:
+            return NotBatchable.FAMILIES
+        _, found = self._sample
+        if found.alone and not found.groups:
+            return found.alone[min(found.alone)]
+        many = self._sweep.count > _LOOKED_AT and 2 * len(found.groups) > _LOOKED_AT
+        return NotBatchable.FAMILIES if many else None
+
+    def _kinds(self) -> tuple[int, int]:
+        """Number of kinds (see ``Members``) among some members, and the number of these."""
+        sweep = self._sweep
+        apart = [place for place in range(len(sweep.axes)) if not self.axes.traced(place)]
+        if sweep.product or not apart:
+            return math.prod(sweep.axes[place].values.count for place in apart), sweep.count
+        some = np.arange(0, sweep.count, -(-sweep.count // _COUNTED))
+        codes = np.stack([self.axes.codes(place, some) for place in apart])
+        return len(np.unique(codes, axis=1).T), len(some)
+
+    @cached_property
+    def _sample(self) -> tuple[range, Sorted]:
+        """Members from all over the sweep, sorted."""
+        some = range(0, self._sweep.count, -(-self._sweep.count // _LOOKED_AT))
+        return some, self._sorted(some, most_untraced=_MOST_UNTRACED)
+
+    def _sorted(
+        self, members: Sequence[int], most_refused: int | None = None, most_untraced: int | None = None
+    ) -> Sorted:
+        if len(self._known) > _MOST_HELD:  # whoever represents a family, it has the same numbers
+            self._known.clear()
+            self._runs.clear()
+        families = Families(Members(self._sweep, members, self.axes), most_refused, most_untraced)
+        families.known = self._known
+        return families.sort()
+
+    def compile(self) -> None:
+        """Trace and compile what members from all over the sweep need."""
+        if self.alone is not None:
+            return
+        some, found = self._sample
+        for family, numbers in found.groups[:_MOST_AHEAD]:
+            compiled = self._run_of(family, some[int(numbers.members[0])])
+            compiled.run.compile()
+            if self._estimated:
+                compiled.estimates.compile()
+
+    def run(
+        self, members: Sequence[int], keep: Sequence[str], alone: bool | None = None
+    ) -> tuple[list[Part], list[int], str]:
+        """Run all members that can be run together; none if they were found to run ``alone`` before.
+
+        Returns:
+            Results of these, and of members that no run accepts; places of those still to be run one by one;
+            and the code of the reason why the first of them is left.
+        """
+        if alone or (alone is None and self.alone is not None):
+            return [], list(range(len(members))), (self.alone or NotBatchable.FAMILIES).name.lower()
+        found = self._sorted(members)
+        left = sorted(found.alone)
+        why = found.alone[left[0]].name.lower() if left else ""
+        parts: list[Part] = []
+        for place, error in found.refused.items():
+            reason = "; ".join(str(problem) for problem in error.problems)
+            parts.append((np.array([place]), failed(Outcome.REFUSED, reason)))
+        for family, numbers in found.groups:
+            compiled = self._run_of(family, int(members[int(numbers.members[0])]))
+            for block in compiled.run.blocks(numbers):
+                before = time.process_time()
+                errors = compiled.estimates.of(numbers, block) if self._estimated else None
+                spent = time.process_time() - before
+                done = np.array([status is not None for status in block.status], dtype=bool)
+                if done.any():
+                    parts.append(
+                        (block.members[done], self._results(compiled, block, errors, done, keep, spent))
+                    )
+                if not done.all():
+                    left += block.members[~done].tolist()
+                    why = why or "gave_up"
+        return parts, sorted(left), why
+
+    def refused(self, members: Sequence[int], most: int | None = None) -> tuple[dict[int, ConfigError], int]:
+        """Members that no run accepts, up to ``most``, why, and how many share equations and can be run."""
+        if self.alone is not None:
+            return {}, 0
+        found = self._sorted(members, most, _MOST_UNTRACED)
+        accepted = sum(len(numbers.members) for _, numbers in found.groups)
+        return {int(members[place]): error for place, error in found.refused.items()}, accepted
+
+    def _run_of(self, family: Family, member: int) -> _FamilyRun:
+        if id(family) not in self._runs:
+            prepared = prepare(self._sweep.worked_out(member))
+            variables = [v for v in dataset_variables(prepared) if "units" in v.attributes]
+            self._runs[id(family)] = _FamilyRun(family, BatchRun(family), variables)
+        return self._runs[id(family)]
+
+    @property
+    def _estimated(self) -> bool:
+        return self._sweep.base.config.output.estimate
+
+    def _results(
+        self, compiled: _FamilyRun, block: BatchBlock, errors: MemberErrors | None, done: np.ndarray,
+        keep: Sequence[str], estimating: float,
+    ) -> MemberResults:  # fmt: skip
+        """Results of those members of a block that are ``done``."""
+        sweep = self._sweep
+        kept = _kept(block, compiled.variables, keep, sweep.table.most_events, sweep.added)
+        codes = [-1 if status is None else OUTCOMES.index(status.value) for status in block.status]
+        kept["status"] = status_variable(np.array(codes, dtype=np.int64))
+        over = block.largest_drifts().max(axis=0) > block.drift_bound
+        warned = {WarningCode.DRIFT: over, WarningCode.UNDEFINED: _lost(block)}
+        if errors is not None:
+            gone = WarningCode.RATES_UNCERTAIN if errors.attitude is None else WarningCode.ATTITUDE_UNCERTAIN
+            warned[gone] = errors.uncertain
+        bits = [np.where(found, warning_bits([code.value]), 0) for code, found in warned.items()]
+        kept["warnings"] = warnings_variable(np.bitwise_or.reduce(bits))
+        rows = np.maximum(block.reached - 1, 0)
+        kept |= plain_variables(
+            steps=block.steps,
+            reached=np.where(block.reached > 0, block.times[rows], np.nan),
+            bound=block.drift_bound,
+            attitude_error=None if errors is None else errors.attitude,
+            position_error=None if errors is None else errors.position,
+        )
+        kept = {name: replace(v, values=v.values[done]) for name, v in kept.items()}
+        statuses = [status for status in block.status if status is not None]
+        reasons = {i: one.message for i, one in enumerate(statuses) if one.value not in ENDED_WELL}
+        engines = {f"batch of {block.width}": len(statuses)}
+        return MemberResults(kept, reasons, engines, estimating=estimating)
+
+
+def _lost(block: BatchBlock) -> np.ndarray:
+    """Members in which a recorded variable becomes undefined after having been defined, (members,)."""
+    found = np.zeros(len(block.members), dtype=bool)
+    for values in block.values.values():
+        if np.isfinite(values.sum()):
+            continue
+        bad = np.asarray(np.isnan(values).reshape(*values.shape[:2], -1).any(axis=2))
+        if bad.any():
+            taken = np.arange(len(bad))[:, None] < block.reached
+            known = np.logical_or.accumulate(~bad & taken, axis=0)
+            found |= (bad & taken & known).any(axis=0)
+    return found
+
+
+def _kept(
+    block: BatchBlock,
+    variables: Sequence[Variable],
+    keep: Sequence[str],
+    most_events: int,
+    hidden: str,
+) -> Kept:
+    series, recorded = [], {}
+    for variable in variables:
+        if variable.name in block.values:
+            values = np.moveaxis(block.values[variable.name], 0, 1)
+            recorded[variable.name] = variable
+        elif variable.name in block.drifts:
+            values = block.drifts[variable.name].T[:, :, None]
+        else:
+            continue
+        series.append(MemberSeries(variable, [values]))
+    kept = kept_of_series(series, block.times, block.reached, keep, hidden)
+    recorded = {name: variable for name, variable in recorded.items() if name != hidden}
+    for event in block.events:
+        edges = np.searchsorted(event.member, np.arange(len(block.members) + 1))
+        times = [event.time[a:b] for a, b in pairwise(edges)]
+        points: Points = {
+            name: (recorded[name], [values[a:b] for a, b in pairwise(edges)])
+            for name, values in event.values.items()
+            if name in recorded
+        }
+        kept |= kept_events(event.name, times, most_events, points, keep)
+    return kept
+
 
 _MOST_TRIED = 1000  # members among which there has to be one that can be run
 _LINES = 5  # of each signal's spectrum
@@ -89,46 +771,10 @@ def recording(sweep: Sweep) -> Sweep:
     return replace(sweep, base=sweep.base.having([f"output.record=[{names}]"]), added=GROWTH)
 
 
-def tile_image(
-    config: str, source: str, members: np.ndarray, keys: np.ndarray, items: tuple[str, ...],
-    alone: bool | None, data: str,
-) -> bytes:  # fmt: skip
-    """Run members of a sweep's config and keep items (``items_of``): the sealed file of their tile; ``data``:
-    the folder of what members are fitted to.
-    """
-    began, cpu = time.perf_counter(), time.process_time()
-    results = run_members(
-        sweep_of(config, source), members.tolist(), [plain(item) for item in items], alone, Path(data)
-    )
-    made = {
-        "engines": dict(results.engines),
-        "why_alone": results.why_alone,
-        "estimate_cpu_seconds": results.estimating,
-        "wall_seconds": time.perf_counter() - began,
-        "cpu_seconds": time.process_time() - cpu,
-        "finished_at": provenance.now(),
-        "cpu_model": provenance.cpu_model(),
-        **{f"version_{name}": version for name, version in provenance.versions().items()},
-        **kernel_of_members(config, source),
-    }
-    return Tile(keys, items, results.kept, results.reasons, made).image()
-
-
 def run_members(
-    sweep: Sweep,
-    members: Sequence[int],
-    keep: Sequence[str],
-    alone: bool | None = None,
-    data: Path | None = None,
+    sweep: Sweep, members: Sequence[int], keep: Sequence[str], alone: bool | None = None
 ) -> MemberResults:
-    """Run some members of a sweep and keep the items asked for; ``alone``: see ``Begun``; ``data``: the
-    folder of what they are fitted to, if they are.
-    """
-    if sweep.fits:
-        from rigidsim.workflows.sweeps.fits import fit_members  # which few sweeps need
-
-        assert data is not None
-        return fit_members(sweep, members, data)
+    """Run some members of a sweep and keep the items asked for; ``alone``: see ``Begun``."""
     events = [event.name for event in sweep.base.config.events]
     more = frequencies_of if "frequencies" in keep else None
     parts: list[Part] = []

@@ -14,11 +14,10 @@ from rigidsim.session.dataset import dataset_variables, refuse_taken_names
 from rigidsim.solve.lanes import recommended_width
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.summary_parts import SummaryPart
-from rigidsim.store.sweeps.dataset import OF_FITS, RESERVED, SUFFIXES
+from rigidsim.store.sweeps.tiles import OF_FITS, RESERVED, SUFFIXES
 from rigidsim.workflows.fit.keys import FitKeys
 from rigidsim.workflows.plan import RunPlan, plan
-from rigidsim.workflows.sweeps.batch import why_alone
-from rigidsim.workflows.sweeps.members import batches_of, first_possible, markable, recording
+from rigidsim.workflows.sweeps.members import batches_of, first_possible, markable, recording, why_alone
 
 _ALL = 200
 """Up to this many members are all worked out, with their equations where numbers alone don't decide. Of more,

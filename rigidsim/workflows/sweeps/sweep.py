@@ -1,12 +1,15 @@
-"""Running a sweep: tiles of members until all are there, then the dataset; resumable whatever ends it."""
+"""Running a sweep: tiles of members until all are there, then dataset and summary; resumable at any time."""
 
 import json
 import os
 import time
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from rigidsim.errors import FORCE, OUT, ConfigError, Problem, RunFolderError
 from rigidsim.scene.scene import build_scene
@@ -15,27 +18,130 @@ from rigidsim.scene.validation_messages import shown
 from rigidsim.session.dataset import kernel_attributes
 from rigidsim.store import atomic
 from rigidsim.store.outputs import refuse_inputs
-from rigidsim.store.sweeps.dataset import write_dataset
-from rigidsim.store.sweeps.folder import Begun, SweepFolder
-from rigidsim.store.sweeps.run import SavedSweep, open_sweep
-from rigidsim.store.sweeps.sources import Sources
-from rigidsim.store.sweeps.tiles import identity, read_tile
+from rigidsim.store.sweeps.folder import (
+    Begun,
+    ErrorsOfMembers,
+    SavedSweep,
+    SweepCost,
+    SweepFolder,
+    SweepSummary,
+    open_sweep,
+)
+from rigidsim.store.sweeps.tiles import Gathered, Kept, Sources, identity, read_tile, write_dataset
 from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.fit.observations import folder_of
 from rigidsim.workflows.read import Given, as_experiment, reads_kernels
-from rigidsim.workflows.sweeps.batch import why_alone
-from rigidsim.workflows.sweeps.executors import Workers, cluster, processes
-from rigidsim.workflows.sweeps.fits import given_files, keep_data, refuse_other_data
+from rigidsim.workflows.sweeps.executors import Workers, cluster, leave_tile, processes, sent_tile
+from rigidsim.workflows.sweeps.fits import fitted_of, given_files, keep_data, refuse_other_data
 from rigidsim.workflows.sweeps.members import (
+    ENDED_WELL,
+    OUTCOMES,
+    WARNINGS,
     batches_of,
     get_ready,
     recording,
     refuse_other_kernel,
     sweep_of,
-    tile_image,
+    why_alone,
 )
 from rigidsim.workflows.sweeps.plan import Each, check_sweep, refuse_untold_tiles, tile_length
-from rigidsim.workflows.sweeps.summary import summary_of
+
+_DECIDING = ("version_", "cpu_model", "ephemeris_", "orientation_")  # what decides on bits
+_ERRORS = {
+    "attitude": ("attitude_error", "rad"),
+    "position": ("position_error", "m"),
+    "modelling": ("modelling_error", "rad"),
+    "modelling_norm": ("modelling_error_norm", "1"),
+    "modelling_energy": ("modelling_error_energy", "1"),
+}
+"""Announced errors of members: their variables and units."""
+
+
+def summary_of(wanted: Sweep, sources: Sources, found: Gathered, wall: float, cpu: float) -> SweepSummary:
+    """Contents of ``summary.json`` for a complete sweep; seconds of this process."""
+    ended_as, warned_of = np.zeros(len(OUTCOMES), dtype=np.int64), np.zeros(len(WARNINGS), dtype=np.int64)
+    steps = 0
+    worst: dict[str, float] = {}
+    estimated: dict[str, list[np.ndarray]] = {name: [] for name in _ERRORS}
+    fits: list[tuple[Kept, np.ndarray]] = []
+    for tile, _, rows in sources.parts():
+        arrays = {name: variable.values[rows] for name, variable in tile.kept.items()}
+        ended_as += np.bincount(arrays["status"], minlength=len(OUTCOMES))
+        if wanted.fits:
+            fits.append((tile.kept, rows))
+            continue
+        bits = arrays["warnings"]
+        warned_of += np.array([int((bits >> bit & 1).sum()) for bit in range(len(WARNINGS))])
+        steps += int(arrays["steps"].sum())
+        for name, seen in estimated.items():
+            if (variable := _ERRORS[name][0]) in arrays:
+                values = arrays[variable]
+                seen.append(values[~np.isnan(values)])
+        for name, values in arrays.items():
+            if name.endswith("_drift_largest"):
+                largest = np.nanmax(values, initial=0.0)
+                drift = name.removesuffix("_largest")
+                worst[drift] = max(worst.get(drift, 0.0), float(largest))
+    outcomes = {OUTCOMES[i]: int(n) for i, n in enumerate(ended_as) if n}
+    failing = wanted.count - sum(outcomes.get(status, 0) for status in ENDED_WELL)
+    warned = {WARNINGS[i]: int(n) for i, n in enumerate(warned_of) if n}
+    warnings = {code: f"{number:,} members are warned of: {code}" for code, number in warned.items()}
+    if failing:
+        said = f"{failing:,} members didn't end well; failed_member and failed_reason say which"
+        warnings = {"members_failed": said, **warnings}
+    fitted, of_fits = fitted_of(fits)
+    warnings |= of_fits
+    engines: Counter[str] = Counter()
+    for made in found.made:
+        engines.update(made["engines"])
+    kinds = [{k: v for k, v in made.items() if k.startswith(_DECIDING)} for made in found.made]
+    differing = sorted({k for kind in kinds for k, v in kind.items() if v != kinds[0].get(k)})
+    mixed = ", ".join(differing) or None
+    if mixed:
+        said = f"tiles were computed with different {mixed}: members may differ in their last bits"
+        warnings["mixed_provenance"] = said
+    return SweepSummary(
+        kind="sweep",
+        name=wanted.experiment.config.name,
+        description=wanted.experiment.config.description,
+        status="finished",
+        message=f"all {wanted.count:,} members were {'fitted' if wanted.fits else 'run'}",
+        exit_code=0,
+        members=wanted.count,
+        shape=dict(zip(wanted.dims, wanted.shape, strict=True)),
+        axes={axis.name: axis.key for axis in wanted.axes},
+        keep=list(wanted.table.keep),
+        outcomes=outcomes,
+        warned=warned,
+        warnings=list(warnings.values()),
+        warning_codes=list(warnings),
+        engines=dict(engines),
+        why_alone=next((made["why_alone"] for made in found.made if made.get("why_alone")), None),
+        cost=SweepCost(
+            steps=steps,
+            cpu_seconds=sum(made["cpu_seconds"] for made in found.made),
+            wall_seconds_of_tiles=sum(made["wall_seconds"] for made in found.made),
+            tiles=len(found.made),
+            estimate_cpu_seconds=sum(made.get("estimate_cpu_seconds", 0.0) for made in found.made),
+            session_wall_seconds=wall,
+            session_cpu_seconds=cpu,
+        ),
+        largest_drifts=worst,
+        estimated_errors={
+            name: ErrorsOfMembers(
+                members=len(values),
+                median=float(np.median(values)),
+                largest=float(values.max()),
+                units=_ERRORS[name][1],
+            )
+            for name, parts in estimated.items()
+            if len(values := np.concatenate([np.zeros(0), *parts]))
+        },
+        fitted=fitted,
+        config_sha256=wanted.experiment.sha256,
+        provenance=kinds[0] if kinds else {},
+        mixed_provenance=mixed,
+    )
 
 
 class SweepObserver:
@@ -228,7 +334,7 @@ def _compute(
     observer: SweepObserver,
 ) -> tuple[KeyboardInterrupt | None, bool]:
     """Compute the missing tiles; returns what interrupted the work, if anything, and whether any is left."""
-    sources, begun = Sources(wanted, folder), folder.begun
+    sources, begun = Sources(wanted, folder.path, folder.tile_files()), folder.begun
     experiment, sha256 = wanted.experiment, wanted.experiment.sha256
     blocks = [range(first, min(first + length, wanted.count)) for first in range(0, wanted.count, length)]
     missing = [
@@ -261,7 +367,7 @@ def _compute(
             observer.progressed(done)
     except KeyboardInterrupt as interruption:
         return interruption, True
-    return None, bool(Sources(wanted, folder).missing.any())
+    return None, bool(Sources(wanted, folder.path, folder.tile_files()).missing.any())
 
 
 def _results(
@@ -270,26 +376,13 @@ def _results(
     """Tasks with what their workers send back: the tile, unless it is saved where they see the folder."""
     if workers is None:
         return _here(tasks)
-    return workers.each(leave_tile if workers.local else _sent, tasks)
+    return workers.each(leave_tile if workers.local else sent_tile, tasks)
 
 
 def _here(tasks: Iterator[tuple[Any, ...]]) -> Iterator[tuple[tuple[Any, ...], None]]:
     for task in tasks:
         leave_tile(*task)
         yield task, None
-
-
-def leave_tile(path: Path, *task: Any) -> None:
-    """Compute a tile (see ``tile_image``); on return it is saved.
-
-    A worker sends no long answer: what was half written into the pipe of its pool when it was killed would be
-    waited for, for ever.
-    """
-    atomic.write_bytes(path, tile_image(*task))
-
-
-def _sent(path: Path, *task: Any) -> bytes:
-    return tile_image(*task)
 
 
 def _alone(wanted: Sweep) -> bool | None:
@@ -301,7 +394,7 @@ def _alone(wanted: Sweep) -> bool | None:
 
 def _completed(wanted: Sweep, folder: SweepFolder, wall: float, cpu: float) -> SavedSweep:
     """Write dataset and summary once all tiles are there."""
-    sources = Sources(wanted, folder)
+    sources = Sources(wanted, folder.path, folder.tile_files())
     found = sources.gather()
     summary = summary_of(wanted, sources, found, wall, cpu)
     attributes = {

@@ -11,9 +11,10 @@ import xarray
 from rigidsim.errors import RESUME, ConfigError, Problem, RunFolderError
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.store import provenance
-from rigidsim.store.sweeps.run import SavedSweep, open_sweep
+from rigidsim.store.sweeps.folder import SavedSweep, open_sweep
 from rigidsim.store.sweeps.tiles import Kept
-from rigidsim.workflows.sweeps.members import refuse_other_kernel, run_members, sweep_of
+from rigidsim.workflows.sweeps.executors import results_of
+from rigidsim.workflows.sweeps.members import refuse_other_kernel, sweep_of
 from rigidsim.workflows.verify import Difference, Verdict, first_unequal
 
 MEMBERS = 100
@@ -37,7 +38,7 @@ def verify_sweep(path: str | Path, *, members: int = MEMBERS, seed: int | None =
         problems = _problems(saved, dataset, sweep)
         chosen = sorted(random.Random(seed).sample(range(sweep.count), min(members, sweep.count)))
         alone = None if (begun := saved.folder.begun) is None else begun.alone
-        again = run_members(sweep, chosen, sweep.table.keep, alone, saved.folder.data).kept
+        again = results_of(sweep, chosen, sweep.table.keep, alone, saved.folder.data).kept
         found = _differences(dataset, sweep, chosen, again)
     changed = _environment(saved.outcome.provenance)
     if saved.outcome.mixed_provenance:
