@@ -13,7 +13,6 @@ import mpmath
 from rigidsim.analysis.labels import Known
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import loads_of
-from rigidsim.model.loads.attraction import ByPlacedSource
 from rigidsim.model.loads.elasticity import Elasticity
 from rigidsim.model.loads.fluid_core import FluidCore, core_of
 from rigidsim.model.sources import in_body_axes
@@ -29,11 +28,10 @@ of the figure axis.
 """
 _SYMMETRIC = 1e-12  # relative difference of two moments, below which a body is symmetric
 _SMALL = 1e-5  # relative change of the frequencies of modes by their own amplitude
-_TORQUES = 0.02  # the same by torques
+_TORQUES = 0.02  # the same of modes and of the spin by torques
 _NEAR = 0.3  # of the spin, across it, from which a rotation isn't one about an axis
 _IN_STEP = 0.35  # relative difference of the spin's square from that of a circular orbit at the distance
 _FACING = 0.8  # cosine between a principal axis and the source
-_SPIN = 0.02  # relative amount by which torques may change spin and wobble
 OF_ROTATION = ("spin", "wobble", "free_nutation", "free_core_nutation")
 """Frequencies of the rotation, which an averaged motion lacks."""
 _CENTURY = 36525 * 86400
@@ -59,7 +57,7 @@ def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
     found = []
     loads = [load for load in loads_of(scene) if load.beside is None]
     elastic = any(isinstance(load, Elasticity) for load in loads)
-    cored = [] if elastic else _modes_of_core(scene)
+    cored = [] if elastic or core_of(scene) is None else _of_rotation(scene)
     known = (Elasticity, FluidCore) if cored or elastic else ()
     if carried_beside([load for load in loads if not isinstance(load, known)]):
         return []
@@ -73,7 +71,7 @@ def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
     librations = _librations(scene, alone, next((k.value for k in found if k.name == "Om"), None))
     if cored or elastic:  # whose own distortion changes the wobble
         return found + cored + librations
-    return found + (librations or _of_spin(scene))
+    return found + (librations or _of_rotation(scene))
 
 
 def _of_motion(motion: Any) -> list[Known]:
@@ -126,27 +124,36 @@ def _delaunay(scene: Scene) -> list[Known]:
     return [Known(name, context.mpf(rate) * unit, 0.0, source, error) for name, rate in _DELAUNAY.items()]
 
 
-def _of_spin(scene: Scene) -> list[Known]:
-    """Spin and wobble of a body that turns about its axis of largest or smallest moment, without torques."""
-    context, axes = scene.context, scene.body.principal_axes
-    order = sorted(range(3), key=lambda i: scene.body.principal_moments[i])
-    turning = _turning(scene, axes[order[2]]) or _turning(scene, axes[order[0]])
-    if turning is None:
+def _of_rotation(scene: Scene) -> list[Known]:
+    """Spin, wobble and free core nutation of a body that turns about its core's axis, or without a core about
+    its axis of largest or smallest moment; none for other motions, and no wobble where it is a libration.
+    """
+    body, core = scene.body, core_of(scene)
+    order = sorted(range(3), key=lambda i: body.principal_moments[i])
+    axes = [body.principal_axes[order[i]] for i in (2, 0)] if core is None else [core.axis]
+    turning = next(filter(None, (_turning(scene, axis) for axis in axes)), None)
+    modes = None if turning is None else _modes(scene, core, turning)
+    if turning is None or modes is None:
         return []
-    spin, (a, b, c) = abs(turning.rate), turning.moments
-    change = _spin_change(scene, turning)
-    rough, errors = (_SPIN, (0.0, 0.0)) if change is None else (0.0, change)
-    where = "body" if abs(a - b) <= _SYMMETRIC * c and change is not None else ""
+    spin, (low, high, polar) = turning.rate if core else abs(turning.rate), turning.moments
+    change = _spin_change(scene, turning, cored=core is not None)
+    of_spin, of_modes = change or (0.0, _SMALL)
+    exact = change is not None and (core is None or core.friction == 0)
+    error, rough = float(of_spin * abs(spin)) if exact else 0.0, 0.0 if change else _TORQUES
+    turned = "body" if exact and abs(high - low) <= _SYMMETRIC * polar else ""
     source = "initial rate about the principal axis"
-    found = [Known("spin", spin, rough, source, float(errors[0] * spin), where)]
-    if a > 0 and b > 0 and (c - a) * (c - b) > 0:
-        wobble = spin * context.sqrt((c - a) * (c - b) / (a * b))
-        source, error = "free nutation: w sqrt((C-A)(C-B)/(A B))", float(errors[1] * wobble)
-        found.append(Known("wobble", wobble, rough, source, error, "" if change is None else "body"))
-        if change is not None:  # its counterpart, nearly as fast as the spin
-            total = spin + (wobble if c > a else -wobble)
-            source = "free nutation in space: the spin with the wobble"
-            found.append(Known("free_nutation", total, 0.0, source, error + found[0].error, "space"))
+    found = [Known("spin", spin, 0.0 if exact else _TORQUES, source, error, turned)]
+    source = "free nutation: w sqrt((C-A)(C-B)/(A B))" if core is None else "linearised equations of mantle "
+    source += "and core" if core else ""
+    for name, (rate, fading) in modes.items():
+        own = float(of_modes * abs(rate) + fading)
+        if name == "free_core_nutation":
+            found.append(Known(name, rate + spin, rough, f"{source}, in space", own))
+        elif core is None or not _librations(scene):
+            found.append(Known(name, rate if core else abs(rate), rough, source, own, "body" * exact))
+            if exact:  # its counterpart, nearly as fast as the spin
+                words = f"{source}, in space"
+                found.append(Known("free_nutation", rate + spin, 0.0, words, own + error, "space"))
     return found
 
 
@@ -173,11 +180,11 @@ def _turning(scene: Scene, axis: Vector) -> _Turning | None:
     return _Turning(rate, [low, high, moments[largest]], float((across / rate) ** 2))
 
 
-def _spin_change(scene: Scene, turning: _Turning, known: type | None = None) -> tuple[float, float] | None:
+def _spin_change(scene: Scene, turning: _Turning, *, cored: bool) -> tuple[float, float] | None:
     """Relative errors of the spin about a principal axis as at the start, and of the torque-free wobble.
 
-    None where other torques than gravity gradients (and a ``known`` type, or beside others) act, or where
-    the amplitude of a body without symmetry counts.
+    None where other torques than gravity gradients act (and those of a core), or where the amplitude of a
+    body without symmetry counts.
     """
     low, high, polar = turning.moments
     tides = scene.context.zero
@@ -186,7 +193,7 @@ def _spin_change(scene: Scene, turning: _Turning, known: type | None = None) -> 
         if source is not None:
             distance = source.placement.nearest(scene)
             tides += 3 * source.gravitational_parameter / distance**3 / turning.rate**2
-        elif known is None or not (load.beside or isinstance(load, known)):
+        elif not (cored and (load.beside or isinstance(load, FluidCore))):
             return None
     uneven = float(abs(high - low) / polar)
     if uneven > _SYMMETRIC and turning.tumbling > _SMALL:
@@ -194,48 +201,21 @@ def _spin_change(scene: Scene, turning: _Turning, known: type | None = None) -> 
     return uneven * (turning.tumbling + float(tides)), _SMALL + float(tides)
 
 
-def _modes_of_core(scene: Scene) -> list[Known]:
-    """Spin, wobble and free core nutation of a body with a core that turns about the core's axis; none for
-    other motions.
-    """
-    core = core_of(scene)
-    turning = None if core is None else _turning(scene, core.axis)
-    if core is None or turning is None:
-        return []
-    spin, moments = turning.rate, turning.moments
-    change = _spin_change(scene, turning, FluidCore)
-    found = _core_modes(scene, core, spin, moments)
-    if found is None:
-        return []
-    (wobble, fading), (nutation, core_fading) = found
-    source = "linearised equations of mantle and core"
-    pulled = all(
-        isinstance(x, FluidCore) or (isinstance(x, ByPlacedSource) and not x.pulls) for x in loads_of(scene)
-    )
-    rough, symmetric = 0.0 if pulled else _TORQUES, abs(moments[0] - moments[1]) <= _SYMMETRIC * moments[2]
-    errors = [float(_SMALL * abs(x) + y) for x, y in ((wobble, fading), (nutation, core_fading))]
-    exact = change is not None and core.friction == 0
-    spinning, error = (0.0, float(change[0] * abs(spin))) if exact and change else (_TORQUES, 0.0)
-    where, turned = "body" if exact else "", "body" if exact and symmetric else ""
-    known = [
-        Known("spin", spin, spinning, "initial rate about the principal axis", error, turned),
-        Known("free_core_nutation", nutation + spin, rough, f"{source}, in space", errors[1]),
-    ]
-    if not _librations(scene):
-        known.append(Known("wobble", wobble, rough, source, errors[0], where))
-        if exact:
-            total = errors[0] + error
-            known.append(Known("free_nutation", wobble + spin, rough, f"{source}, in space", total, "space"))
-    return known
-
-
-def _core_modes(scene: Scene, core: FluidCore, spin: Any, moments: Vector) -> Any:
+def _modes(scene: Scene, core: FluidCore | None, turning: _Turning) -> dict[str, tuple[Any, Any]] | None:
     """Frequencies in body axes (rad/s, with the sense of the spin) of the wobble and of the nearly diurnal
-    mode, each with the rate at which friction damps it; None where these aren't circular or elliptic motions.
+    mode of a core, each with the rate at which friction damps it, of the linearised equations; None where
+    those of a core aren't circular or elliptic motions.
     """
-    context, polar, f = scene.context, core.polar, core.flattening
+    context, spin, (low, high, c) = scene.context, turning.rate, turning.moments
+    if core is None:
+        stiffness = (c - low) * (c - high)
+        if low == 0 or stiffness <= 0:
+            return {}
+        wobble = abs(spin) * context.sqrt(stiffness / (low * high))
+        return {"wobble": (wobble if c > low else -wobble, 0.0)}
+    polar, f = core.polar, core.flattening
     core_rate = dot(core.axis, core.at_start(scene))
-    a, b, c = moments[0] - polar * (1 - f), moments[1] - polar * (1 - f), moments[2] - polar
+    a, b, c = low - polar * (1 - f), high - polar * (1 - f), c - polar
     push, drag = polar * f * core_rate, core.friction
     pull = core_rate / (1 - f)
     own = drag / (polar * (1 - f))
@@ -258,7 +238,7 @@ def _core_modes(scene: Scene, core: FluidCore, spin: Any, moments: Vector) -> An
     if len(found) != 2:
         return None
     found.sort(key=lambda mode: abs(mode[0] / spin + 1))  # the nearly diurnal one is near -1 spin
-    return found[1], found[0]
+    return {"free_core_nutation": found[0], "wobble": found[1]}
 
 
 def _librations(scene: Scene, alone: Any = None, node_rate: Any = None) -> list[Known]:
