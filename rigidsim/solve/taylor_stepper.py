@@ -19,7 +19,7 @@ _ARRIVED = hy.taylor_outcome.time_limit
 _LOST = hy.taylor_outcome.err_nf_state
 _FAR = 1e300  # a target that no run reaches: propagation ends by the count of steps
 _MOST_TO_WHOLE_TIME = 1000  # steps
-_CHUNK_TO, _MOST_CHUNKS_TO = 256, 4000  # steps to a given time at once, and how often between two limits
+_CHUNK_TO, _MOST_CHUNKS_TO = 256, 4000  # steps to a given time at once, and how often so many
 _HOPELESS_STEPS = 1e15  # left to the last sample; at the fastest pace they would take years
 _LEAST_GRID = 8  # steps from which a grid, of 20 us, costs less than a callback
 _TINY_STEPS = 32  # in a row, before a run is given up: a close passage has some
@@ -226,21 +226,18 @@ class TaylorStepper(Stepper):
 
     def to(self, time: Scalar) -> bool:
         """Go exactly to a time with a shortened last step: for comparisons, never for a run's samples."""
-        chunks = _MOST_CHUNKS_TO
-        while chunks > 0:  # Ctrl-C is heeded between chunks
-            until = self._meet()
-            last = until is None or time <= until
-            outcome, _, _, taken, *_ = self._integrator.propagate_until(
-                time if last else until,
-                max_steps=_CHUNK_TO,
-                max_delta_t=self._longest,
-                callback=list(self._requirement.each) or None,
-            )
-            if outcome == _ARRIVED and last:
-                return True
-            if outcome not in (_ARRIVED, hy.taylor_outcome.step_limit) or not taken:
-                break
-            chunks = _MOST_CHUNKS_TO if outcome == _ARRIVED else chunks - 1
+        chunks, known, watcher = _MOST_CHUNKS_TO, self.until, self.watcher
+        self.until, self.watcher = time if known is None else min(time, known), None
+        try:
+            while chunks > 0:  # Ctrl-C is heeded between chunks
+                if time - self.time <= abs(time) * self._epsilon:
+                    return True
+                before = self.steps
+                if not self.take(_CHUNK_TO) or self.steps == before:
+                    break
+                chunks -= self.steps - before == _CHUNK_TO
+        finally:
+            self.until, self.watcher = known, watcher
         return False
 
     def _propagate(

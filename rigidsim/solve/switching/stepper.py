@@ -53,7 +53,6 @@ from rigidsim.solve.taylor_stepper import TaylorStepper
 _ATTEMPTS = 32  # at one step that begins on a surface
 _MISTAKEN = 2.0**10  # roundings of an argument from which on the engine can't have found its zero
 _FAR_OFF = 2.0**100  # within the range of single precision
-_MOST_CALLS = 1000  # that take steps on to a given time
 _FIRST_AHEAD, _MOST_AHEAD = 16, 1024  # steps that are looked at together: some MB of series
 _MOST_SWITCHES = 256
 """Switches at intervals shorter than ``_SHORTEST`` that count as an accumulation, or as swings kept up by
@@ -114,8 +113,9 @@ class SwitchingStepper(TaylorStepper):
         self._count_of_pars = system.parameters  # without what is added to events
         self._piece: np.ndarray | None = None  # parameters of the piece in which the latest step was
         self._now = np.zeros(0)  # parameters that sides and equations read, all of them
-        self._off, self._minus, self._plus = _scalars(precision, [0.0, -1.0, 1.0])
+        self._off, self._minus, self._plus = map(precision.of_double, (0.0, -1.0, 1.0))
         super().__init__(system, precision, tolerance, start, log)
+        self._engines[0, ()] = self._integrator
         # in the partner chart, where a run may begin, angles are plain already
         self._turned = Turned.begun(system, *self._plain(self.state, self.time))
         self._dense = self._integrator
@@ -186,7 +186,8 @@ class SwitchingStepper(TaylorStepper):
         """Continue with the equations of this chart along the current surfaces."""
         key = self._chart, self._along
         if key not in self._engines:
-            interruptible(lambda: self._compiled(self._system_of(self._chart), self._along))
+            system = self._system_of(self._chart)
+            self._engines[key] = interruptible(lambda: self._compiled(system, self._along))
         entered = self._engines[key]
         if entered is not self._integrator:
             entered.dtime = self._integrator.dtime
@@ -210,7 +211,7 @@ class SwitchingStepper(TaylorStepper):
             noted = engine_events(system, self.precision, self.log, offsets=offsets)
         if self._tolerance is not None:
             options["tol"] = self._tolerance
-        integrator = hy.taylor_adaptive(
+        return hy.taylor_adaptive(
             equations,
             self.precision.array(system.initial),
             time=self._start,
@@ -219,8 +220,6 @@ class SwitchingStepper(TaylorStepper):
             compact_mode=self.precision.compact or system.wide or len(along) > 1,
             **options,
         )
-        self._engines[self._chart, along] = integrator
-        return integrator
 
     def _event(
         self, u: hy.expression, j: int, end: int = 0, way: hy.event_direction = hy.event_direction.any
@@ -246,13 +245,13 @@ class SwitchingStepper(TaylorStepper):
         """Parameters of the equations; turns of angles, and the sign of the quaternion, are given."""
         modes = self._modes if over is None else [over.get(j, mode) for j, mode in enumerate(self._modes)]
         sides = [-1.0 if mode < 0 else 1.0 for mode in modes]
-        numbers = [*sides, *turns]
+        numbers, scalars = [*sides, *turns], self.precision.of_doubles
         if (pieces := self.system.pieces) is not None:
             if self._piece is None:  # of those that meet at a boundary, the one that ends there
                 self._piece = self._piece_of(bisect_left(pieces.knots, self.time))
             numbers += [0.0] * (self.system.first_of_pieces - len(numbers))
-            return np.concatenate([_scalars(self.precision, numbers), self._piece])
-        pars = _scalars(self.precision, numbers)
+            return np.concatenate([scalars(np.array(numbers) + 0.0), self._piece])
+        pars = scalars(np.array(numbers) + 0.0)
         if not self._functions.clocked:
             return pars
         return np.concatenate([pars, np.array([self._off if low is None else low], dtype=pars.dtype)])
@@ -314,7 +313,7 @@ class SwitchingStepper(TaylorStepper):
                 self._event_offset(value, noise)
                 for value, noise in self._functions.crossings(*one(self.state, self.time, pars))[..., 0].T
             ]
-        everything = np.concatenate([pars, _scalars(self.precision, moved)])
+        everything = np.concatenate([pars, self.precision.of_doubles(np.array(moved))])
         engine.pars[:] = everything[: len(engine.pars)]  # those that nothing reads have no meaning
         self._now = pars
         self._offset = [self.system.parameters + i for i, number in enumerate(moved) if number]
@@ -338,7 +337,7 @@ class SwitchingStepper(TaylorStepper):
                     smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
                 going = samples is None or not samples.ended
             if alone and going and self.steps < last:
-                if not self._one():
+                if not self.step():
                     return False
                 smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
                 going = samples is None or samples(self._dense)
@@ -484,28 +483,13 @@ class SwitchingStepper(TaylorStepper):
 
     # --- one step -------------------------------------------------------------------------------------------
 
-    def step(self) -> bool:
-        """Take one step, not past a surface; False if lost, or if it can't go on (``failure`` says why)."""
-        return self._one()
-
-    def to(self, time: Scalar) -> bool:
-        known = self.until
-        try:
-            self.until = time if known is None else min(time, known)
-            for _ in range(_MOST_CALLS):
-                if time - self.time <= abs(time) * self._epsilon:
-                    return True
-                if not self.take(_MOST_AHEAD):
-                    break
-        finally:
-            self.until = known
-        return False
-
     def dense(self, time: Scalar) -> np.ndarray:
         return np.array(self._dense.update_d_output(time))
 
-    def _one(self) -> bool:
-        """Take a step by itself, and decide how the motion goes on from its end."""
+    def step(self) -> bool:
+        """Take a step by itself, not past a surface, and decide how the motion goes on from its end; False if
+        lost, or if it can't go on (``failure`` says why).
+        """
         if self._unsettled:
             self.failure = self._unsettled
             return False
@@ -531,7 +515,7 @@ class SwitchingStepper(TaylorStepper):
             reached = knot if self._cut is None and size >= left else None
             if reached is not None:
                 engine.dtime = reached
-            missed, mistaken = self._missed(before), self._mistaken(before)
+            missed, mistaken = self._wrong(before)
             if missed is None and mistaken is None:
                 break
             self._return(time, before, events)
@@ -606,22 +590,17 @@ class SwitchingStepper(TaylorStepper):
         time = self.time
         self.log.quiet_until = time + self._width(time) if self._crossed else None
 
-    def _missed(self, before: np.ndarray) -> int | None:
-        """A surface on whose wrong side the step just taken ended, although the engine found no zero."""
-        look = self._look(self.state, self.time, self._low)
-        wrong = -np.array(self._modes) * look.u[:, 0] > look.noises(before, self.state)[:, 0]
-        here = -1 if self._cut is None else self._cut[0]
-        return next((j for j in np.flatnonzero(wrong & self._free).tolist() if j != here), None)
-
-    def _mistaken(self, before: np.ndarray) -> int | None:
-        """A surface on which the engine ended the step just taken, although it isn't there: as for a function
-        far narrower than the step.
+    def _wrong(self, before: np.ndarray) -> tuple[int | None, int | None]:
+        """A surface on whose wrong side the step just taken ended, although the engine found no zero; and one
+        on which it ended although that isn't there, as for a function far narrower than the step.
         """
-        if self._cut is None or not self._moments.may_mistake(j := self._cut[0]):
-            return None
-        look = self._look(self.state, self.time, self._low)
-        noise = look.noises(before, self.state, look.field.T)[j, 0]
-        return j if abs(look.u[j, 0]) > _MISTAKEN * noise else None
+        look, here = self._look(self.state, self.time, self._low), -1 if self._cut is None else self._cut[0]
+        wrong = -np.array(self._modes) * look.u[:, 0] > look.noises(before, self.state)[:, 0]
+        missed = next((j for j in np.flatnonzero(wrong & self._free).tolist() if j != here), None)
+        if not self._moments.may_mistake(here):
+            return missed, None
+        noise = look.noises(before, self.state, look.field.T)[here, 0]
+        return missed, here if abs(look.u[here, 0]) > _MISTAKEN * noise else None
 
     # --- surfaces -------------------------------------------------------------------------------------------
 
@@ -795,13 +774,6 @@ class SwitchingStepper(TaylorStepper):
         what_to_do = what_to_do or surface.remedy
         self.failure = f'at the kink or jump of "{surface.text}" ({surface.where}) {why}; {what_to_do}'
         return False
-
-
-def _scalars(precision: Precision, numbers: list[float]) -> np.ndarray:
-    """Numbers of a precision."""
-    if issubclass(precision.scalar, float | np.floating):
-        return np.array(numbers, dtype=precision.scalar) + 0
-    return np.array([precision.of_double(x) for x in numbers], dtype=precision.scalar)
 
 
 def stepper_of(
