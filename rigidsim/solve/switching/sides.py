@@ -31,7 +31,6 @@ _RATE_ROUNDINGS = 1024.0  # the same for its rate, whose terms are products of d
 
 _LEAST = 2.0**-20
 """The same where the state is zero: a rate that is zero but for a rounding turns back after its square."""
-_CLOSE = 2.0**10 * _ROUNDINGS  # roundings from which on an argument is far from zero
 
 
 @dataclass(frozen=True)
@@ -122,12 +121,6 @@ class SurfaceFunctions:
         found = self._often(state, pars=pars, time=time)[self._ends[1] :]
         noise = max(_ROUNDINGS * float(found[self._surfaces + j]), _LEAST)
         return 2 * abs(float(found[j])) + self._epsilon * noise
-
-    def asks(self, states: np.ndarray, times: np.ndarray, pars: np.ndarray, sides: np.ndarray) -> np.ndarray:
-        """At which of many states (n,) an argument isn't well on its side (n, surfaces)."""
-        found = _by_columns(self._often, states, times, pars)[self._ends[1] : self._ends[2]]
-        u, sizes = np.split(found, 2)
-        return np.asarray((sides.T * u <= _CLOSE * self._epsilon * (sizes + 1.0)).any(axis=0))
 
     def looks(self, states: np.ndarray, times: np.ndarray, pars: np.ndarray) -> SurfaceValues:
         """Surfaces and fields at many states (n, states), times (n,) and parameters (n, parameters)."""

@@ -438,22 +438,27 @@ class SwitchingStepper(TaylorStepper):
         if not passed:
             return 0, False
         states = np.array([begun.state, *(one.mark.state for one in passed)])
-        times = np.array([one.mark.time[0] for one in passed])
+        before, here, times = states[:-1], states[1:], np.array([one.mark.time[0] for one in passed])
         pars, crossed = np.array([one.pars for one in passed]), np.array([one.crossed for one in passed])
         sides = np.where(pars[:, : len(self._modes)] > 0, 1.0, -1.0)
-        bad, near = np.zeros((2, len(passed)), dtype=bool)
-        rows = np.flatnonzero((crossed >= 0) | self._functions.asks(states[1:], times, pars, sides))
-        if len(rows):
-            before, here = states[:-1][rows], states[1:][rows]
-            looks = self._functions.looks(here, times[rows], pars[rows])
-            others = self._free[:, None] & (np.arange(sides.shape[1])[:, None] != crossed[rows])
-            wrong = sides[rows].T * looks.u < -looks.noises(here)
-            close = np.abs(looks.u) <= looks.noises(before, here, looks.field.T)
-            bad[rows], near[rows] = (others & wrong).any(axis=0), (others & close).any(axis=0)
+        look = self._functions.looks(here, times, pars)
+        size, widths = np.abs(look.u), look.noises(before, here, look.field.T)
+        others = self._free[:, None] & (np.arange(sides.shape[1])[:, None] != crossed)
+        bad = (others & (sides.T * look.u < -look.noises(here))).any(axis=0)
+        near = (others & (size <= widths)).any(axis=0)
         rows = np.flatnonzero(crossed >= 0)
         if len(rows):
-            there = states[:-1][rows], states[1:][rows], times[rows], pars[rows]
-            bad[rows] |= near[rows] | ~self._crossing(*there, crossed[rows])
+            j, each, flipped = crossed[rows], np.arange(len(rows)), pars[rows]
+            flipped[each, j] = -flipped[each, j]
+            beyond = self._functions.looks(here[rows], times[rows], flipped)
+            least = sides[rows, j] * np.array([look.rates[j, rows], beyond.rates[j, each]])
+            noise = np.maximum(look.rate_noises[j, rows], beyond.rate_noises[j, each])
+            narrow = np.array([self._moments.may_mistake(k) for k in j])
+            there = ~narrow | (size <= _MISTAKEN * widths)[j, rows]
+            bad[rows] |= near[rows] | ~(there & (least.min(axis=0) > noise))
+            if self.has_events:
+                value, width = self._functions.crossings(here[rows], times[rows], pars[rows])
+                bad[rows] |= (np.abs(value) <= width).any(axis=0)
         series = [(row, one.series) for row, one in enumerate(passed) if one.series is not None]
         maybe = may_be_sparse(np.array([found for _, found in series])) if series else np.zeros(0)
         for k in np.flatnonzero(maybe):
@@ -462,24 +467,6 @@ class SwitchingStepper(TaylorStepper):
         first = int(np.argmax(bad)) if bad.any() else len(passed)
         again = int(np.argmax(near)) + 1 if near.any() else len(passed)
         return min(first, again), first < again and first < len(passed)
-
-    def _crossing(
-        self, before: np.ndarray, states: np.ndarray, times: np.ndarray, pars: np.ndarray, crossed: np.ndarray
-    ) -> np.ndarray:
-        """At which of many boundaries the fields of both sides lead across the surface, and no event is."""
-        rows = np.arange(len(crossed))
-        side, flipped = np.where(pars[rows, crossed] > 0, 1.0, -1.0), pars.copy()
-        flipped[rows, crossed] = -flipped[rows, crossed]
-        looks = [self._functions.looks(states, times, given) for given in (pars, flipped)]
-        least = np.min([side * look.rates[crossed, rows] for look in looks], axis=0)
-        noises = looks[0].noises(before, states, looks[0].field.T)
-        narrow = np.array([self._moments.may_mistake(j) for j in crossed])
-        there = ~narrow | (np.abs(looks[0].u) <= _MISTAKEN * noises)[crossed, rows]
-        found = there & (least > np.max([look.rate_noises[crossed, rows] for look in looks], axis=0))
-        if self.has_events:
-            value, noise = self._functions.crossings(states, times, pars)
-            found &= ~(np.abs(value) <= noise).any(axis=0)
-        return found
 
     # --- one step -------------------------------------------------------------------------------------------
 
