@@ -161,11 +161,12 @@ def unoptimised_code() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(hy, "taylor_adaptive", _unoptimised(hy.taylor_adaptive, most=60))
         patch.setattr(hy, "cfunc", _unoptimised(hy.cfunc, most=2000))
-        with compiled.kept_in(_UNOPTIMISED):
-            yield
+        patch.setattr(compiled, "FUNCTIONS", _FUNCTIONS)
+        patch.setattr(compiled, "ENGINES", _ENGINES)
+        yield
 
 
-_UNOPTIMISED = compiled.CodeStore()
+_FUNCTIONS, _ENGINES = compiled.Kept[Any](32), compiled.Kept[Any](8)
 
 
 def _unoptimised(make: Callable[..., Any], most: int) -> Callable[..., Any]:

@@ -24,7 +24,7 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.varied_keys import varied_keys
 from rigidsim.solve.compiled import compiled_function, evaluate_rows
-from rigidsim.solve.lanes import BatchEngine, BatchSystem
+from rigidsim.solve.lanes import BatchEngine
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 from rigidsim.solve.tangents import Derivatives, LostTangents, Place, Tangents
 
@@ -125,8 +125,8 @@ class KeyTangents:
         if quickly and precision.name == "double" and alone and small:
             motion = list(zip(system.variables, made.equations, strict=True))
             self._lanes = (
-                BatchEngine(BatchSystem(motion, [], None, compact=False), 1),
-                BatchEngine(BatchSystem(equations, [], _IN_LANES, compact=False), _WIDTH),
+                BatchEngine(motion, 1),
+                BatchEngine(equations, _WIDTH, tolerance=_IN_LANES),
             )
         else:
             self.tangents = Tangents(derivatives, self._moving, self.keys, precision, compact_mode=True)

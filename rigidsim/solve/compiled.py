@@ -10,8 +10,7 @@ import pickle
 import threading
 import warnings
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from functools import cache
 from threading import Lock
 from typing import Any, Generic, TypeVar
@@ -89,25 +88,9 @@ def limit_disk_cache() -> None:
         warnings.warn(f"compiled code isn't kept for the next process: {error}", RuntimeWarning, stacklevel=3)
 
 
-class CodeStore:
-    """Functions and engines compiled so far."""
-
-    def __init__(self) -> None:
-        self.functions: Kept[CompiledFunction] = Kept(32)
-        self.engines: Kept[TaylorEngine] = Kept(8)
-
-
-_stores = [CodeStore()]
-
-
-@contextmanager
-def kept_in(store: CodeStore) -> Iterator[None]:
-    """Use only this store inside the block, in all threads: for code compiled in another way."""
-    _stores.append(store)
-    try:
-        yield
-    finally:
-        _stores.remove(store)
+FUNCTIONS: Kept[CompiledFunction] = Kept(32)
+ENGINES: Kept[TaylorEngine] = Kept(8)
+"""Those compiled so far."""
 
 
 def compiled_function(
@@ -115,7 +98,7 @@ def compiled_function(
 ) -> CompiledFunction:
     """Like ``heyoka.cfunc``, but cached; the functions have no state and may be called by several threads."""
     expressions, variables = list(expressions), list(variables)
-    return _stores[-1].functions.get(
+    return FUNCTIONS.get(
         (expressions, variables, sorted(options.items())),
         lambda: hy.cfunc(expressions, variables, **options),
     )
@@ -123,7 +106,7 @@ def compiled_function(
 
 def compiled_engine(equations: Sequence[Any], initial: Any, **options: Any) -> TaylorEngine:
     """Like ``heyoka.taylor_adaptive`` without events, but cached; each caller gets its own engine."""
-    made = _stores[-1].engines.get(
+    made = ENGINES.get(
         (list(equations), initial, sorted(options.items())),
         lambda: hy.taylor_adaptive(list(equations), initial, **options),
     )

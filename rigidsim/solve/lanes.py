@@ -53,16 +53,6 @@ class LaneResults:
     found: dict[int, list[Found]] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class BatchSystem:
-    """Equations and events (with directions) over heyoka's variables and ``par``, the parameters of both."""
-
-    equations: Sequence[tuple[Any, Any]]
-    events: Sequence[tuple[Any, int]]
-    tolerance: float | None
-    compact: bool
-
-
 def recommended_width() -> int:
     """Number of lanes that this processor handles at once in double precision."""
     return int(hy.recommended_simd_size())
@@ -78,35 +68,42 @@ def _grouped(values: np.ndarray, width: int) -> np.ndarray:
 
 
 class BatchEngine:
-    """A compiled batch integrator of ``width`` lanes."""
+    """A compiled batch integrator of ``width`` lanes, of equations and events (with directions) over heyoka's
+    variables and ``par``, the parameters of both.
+    """
 
-    def __init__(self, system: BatchSystem, width: int) -> None:
+    def __init__(
+        self,
+        equations: Sequence[tuple[Any, Any]],
+        width: int,
+        *,
+        events: Sequence[tuple[Any, int]] = (),
+        tolerance: float | None = None,
+        compact: bool = False,
+    ) -> None:
         self.width = width
-        self._system = system
         # recorded quantities may read more parameters than equations and events
-        read = [right for _, right in system.equations] + [expression for expression, _ in system.events]
+        read = [right for _, right in equations] + [expression for expression, _ in events]
         self._used = max((int(str(p).removeprefix("p")) + 1 for p in hy.get_params(read)), default=0)
         self._log: list[Found] = []
-        if system.events:  # whose callbacks belong to this object
-            self._integrator = self._compiled()
-        else:
-            self._integrator = _engines.get((system, width), self._compiled)
-        self._longest = longest_step(self._integrator.order, np.float64)
-
-    def _compiled(self) -> Any:
-        system, width = self._system, self.width
-        options: dict[str, Any] = {"compact_mode": system.compact}
-        if system.tolerance is not None:
-            options["tol"] = system.tolerance
+        options: dict[str, Any] = {"compact_mode": compact}
+        if tolerance is not None:
+            options["tol"] = tolerance
         if self._used:
             options["pars"] = np.zeros((self._used, width))
-        if system.events:
+        states = np.zeros((len(equations), width))
+        if events:  # whose callbacks belong to this object
             options["nt_events"] = [
                 hy.nt_event_batch(expression, self._noting(n), direction=DIRECTIONS[direction])
-                for n, (expression, direction) in enumerate(system.events)
+                for n, (expression, direction) in enumerate(events)
             ]
-        states = np.zeros((len(system.equations), width))
-        return hy.taylor_adaptive_batch(list(system.equations), states, **options)
+            self._integrator = hy.taylor_adaptive_batch(list(equations), states, **options)
+        else:
+            key = list(equations), width, compact, tolerance
+            self._integrator = _engines.get(
+                key, lambda: hy.taylor_adaptive_batch(list(equations), states, **options)
+            )
+        self._longest = longest_step(self._integrator.order, np.float64)
 
     def _noting(self, event: int) -> Any:
         def called(integrator: Any, time: float, _: int, lane: int) -> None:
@@ -218,9 +215,8 @@ class BatchEngine:
 
     def _note(self, result: LaneResults, members: list[int], arrived: np.ndarray, lost: np.ndarray) -> None:
         result.arrived[members], result.finite[members] = arrived, ~lost
-        if self._system.events:
-            for place, member in enumerate(members):
-                result.found[member] = [crossing for crossing in self._log if crossing.lane == place]
+        for place, member in enumerate(members):
+            result.found[member] = [crossing for crossing in self._log if crossing.lane == place]
 
     def _through_samples(
         self, result: LaneResults, members: list[int], motions: _Motions, most_steps: int

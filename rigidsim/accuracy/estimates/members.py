@@ -37,7 +37,7 @@ from rigidsim.solve.error_tangents import (
     beside,
     timed,
 )
-from rigidsim.solve.lanes import BatchEngine, BatchSystem
+from rigidsim.solve.lanes import BatchEngine
 
 _TOLERANCE = 1e-8  # of lanes, which begin anew at some of the samples
 _BEGUN_ANEW = 16  # times at most
@@ -83,8 +83,8 @@ class MemberEstimates:
         traced = self._traced
         rights = traced.as_parameters([right for _, right in traced.system.equations[: traced.moving]])
         equations = zip(traced.system.variables, timed(rights, len(traced.in_equations)), strict=False)
-        system = BatchSystem(list(equations), [], tolerance, traced.system.wide)
-        return BatchEngine(system, max(self._width, _LANES))
+        width, wide = max(self._width, _LANES), traced.system.wide
+        return BatchEngine(list(equations), width, tolerance=tolerance, compact=wide)
 
     @cached_property
     def _lanes(self) -> BatchEngine:

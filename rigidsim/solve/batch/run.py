@@ -19,7 +19,7 @@ from rigidsim.model.tangents import GROWTH
 from rigidsim.solve.batch.family import Family, Numbers
 from rigidsim.solve.compiled import compiled_function, evaluate_rows
 from rigidsim.solve.events import BESIDE, STATES, TIMES, exponents_of
-from rigidsim.solve.lanes import BatchEngine, BatchSystem, LaneResults, recommended_width
+from rigidsim.solve.lanes import BatchEngine, LaneResults, recommended_width
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
@@ -152,7 +152,7 @@ class BatchRun:
         rights = self._traced.as_parameters([right for _, right in system.equations[:states]])
         equations = list(zip(system.variables[:states], rights, strict=True))
         loose = None if tolerance is None else float(tolerance)
-        return BatchEngine(BatchSystem(equations, list(events), loose, system.wide), self.width)
+        return BatchEngine(equations, self.width, events=events, tolerance=loose, compact=system.wide)
 
     @cached_property
     def _plain(self) -> BatchEngine:
