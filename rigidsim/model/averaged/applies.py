@@ -17,9 +17,8 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.averaged.free_motion import FreeMotion
 from rigidsim.model.averaged.resonance import Resonance
 from rigidsim.model.averaged.sources import Source
-from rigidsim.model.averaged.torques import reads_rates_alone
 from rigidsim.model.averaged.wobble import Wobble
-from rigidsim.model.carriers import carried_beside
+from rigidsim.model.carriers import Carrier, carried_beside
 from rigidsim.model.load import Load
 from rigidsim.scene.choices import ORBIT_AVERAGED
 from rigidsim.scene.readable import span_text
@@ -92,6 +91,12 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
             raise refused(level, against, remedy or _FULL)
     if alone and config.model.short_period:
         refuse_short_period(f"what {alone[0].title} does within a rotation")
+
+
+def reads_rates_alone(load: Load) -> bool:
+    """Whether a load is a function of the body's rates, in body axes, that doesn't depend on time."""
+    placed = load.orbit or load.table or load.has_source
+    return not (load.reads or placed or load.reacts or isinstance(load, Carrier))
 
 
 def refuse_short_period(what: str) -> None:

@@ -33,13 +33,12 @@ goes round with its pericentre is periodic, and left out of the second order.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Self
 
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.orbits.prescribed import ElementStates, OrbitStates
+from rigidsim.model.orbits.prescribed import ElementStates
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.two_part import as_factor, rounded
@@ -97,18 +96,16 @@ class Ellipse:
         return (0.25 + self.square / 6) / (rest * rest * rest)
 
 
-def second_order(eccentricity: float) -> tuple[float, float]:
-    """n c0 and n c1 (see ``Ellipse.across``), by the trapezoidal rule over the eccentric anomaly."""
+def steady(eccentricity: float) -> float:
+    """n c0 (see ``Ellipse.across``), by the trapezoidal rule over the eccentric anomaly."""
     e, root = eccentricity, math.sqrt(1 - eccentricity**2)
     anomaly = 2 * np.pi * np.arange(_POINTS) / _POINTS
     radius = 1 - e * np.cos(anomaly)
-    c, s = (np.cos(anomaly) - e) / radius, root * np.sin(anomaly) / radius
-    f = np.arctan2(s, c)
+    f = np.arctan2(root * np.sin(anomaly) / radius, (np.cos(anomaly) - e) / radius)
     weight = radius / _POINTS  # dM
     across = -np.cos(2 * f) / 2 - e * np.cos(f) / 2 - e * np.cos(3 * f) / 6
     across = (across - (weight * across).sum()) / root**3
-    found = [(weight * radius**-3.0 * x * across).sum() for x in (np.ones_like(f), np.cos(2 * f))]
-    return float(found[0]), float(found[1])
+    return float((weight * radius**-3.0 * across).sum())
 
 
 def nutation(
@@ -157,67 +154,65 @@ def place_by_elements(
 
 
 @dataclass(frozen=True)
-class TableTerms:
-    """A tabulated orbit as an average uses it."""
+class OrbitTerms:
+    """An orbit as an average over it uses it: numbers (mpf) if it is prescribed, expressions if tabulated.
 
-    states: ElementStates
+    Attributes:
+        ellipse: of the moment, its mean motion per internal unit of time.
+        place: of the source; None if the mean longitude isn't carried.
+        cubed: (mean axis / axis)^3.
+        apsides: P and T of a fixed ellipse; None of one whose pericentre moves, where the terms that go round
+            with it are periodic, and of a circle.
+    """
+
+    ellipse: Ellipse
+    normal: list[Symbolic]
+    place: OrbitPlace | None
+    cubed: Any
     number: Rounder
+    apsides: tuple[list[Symbolic], list[Symbolic]] | None = None
 
-    def _value(self, element: str) -> Symbolic:
-        return rounded(self.states.values[element])
-
-    @cached_property
-    def _cubed(self) -> Symbolic:
-        """(mean axis / axis)^3."""
-        axis = self._value(AXIS)
-        return 1.0 / (axis * axis * axis)
-
-    @cached_property
-    def ellipse(self) -> Ellipse:
-        """Ellipse of the moment, its mean motion per internal unit of time."""
-        k, h = self._value("k"), self._value("h")
+    @classmethod
+    def of_elements(cls, states: ElementStates, number: Rounder) -> Self:
+        """Those of a tabulated orbit."""
+        value = {name: rounded(x) for name, x in states.values.items()}
+        k, h, axis, place = value["k"], value["h"], value[AXIS], None
         square = k * k + h * h
-        return Ellipse(hy.sqrt(square), square, hy.sqrt(1.0 - square), rounded(self.states.pace), False)
+        eccentricity, root = hy.sqrt(square), hy.sqrt(1.0 - square)
+        if states.mean_longitude is not None:
+            periapsis = hy.atan2(h, k)
+            anomaly = hy.kepE(eccentricity, states.mean_longitude - periapsis)
+            place = place_by_elements(hy, value, anomaly, periapsis)
+        ellipse = Ellipse(eccentricity, square, root, rounded(states.pace), False)
+        return cls(ellipse, states.normal, place, 1.0 / (axis * axis * axis), number)
 
-    @cached_property
-    def place(self) -> OrbitPlace | None:
-        """Position of the source; None if the mean longitude isn't carried."""
-        longitude = self.states.mean_longitude
-        if longitude is None:
-            return None
-        elements = {name: self._value(name) for name in "qp"}
-        periapsis = hy.atan2(self._value("h"), self._value("k"))
-        anomaly = hy.kepE(self.ellipse.eccentricity, longitude - periapsis)
-        return place_by_elements(hy, elements, anomaly, periapsis)
-
-    @cached_property
-    def seen(self) -> OrbitStates:
-        """Orbit states as where the orbit is resolved; no direction if the position is unknown."""
-        at, states = self.place, self.states
-        if at is None:
-            return OrbitStates(
-                states.block, [], states.normal, hy.expression(1.0), eccentric=states.eccentric
-            )
-        direction, inverse = at.seen(self.ellipse.eccentricity, self.ellipse.root)
-        inverse = inverse / self._value(AXIS)
-        return OrbitStates(states.block, direction, states.normal, inverse, eccentric=states.eccentric)
+    def _times(self, size: Any, value: Any = 1) -> Symbolic:
+        """A number times a value, which is rounded with it if it is a number, too."""
+        if isinstance(value, hy.expression):
+            return as_factor(self.number(size)) * value
+        return as_factor(self.number(size * value))
 
     def secular(self, rate: Any, s: list[Symbolic], *, second: bool) -> list[Symbolic]:
         """Vector whose product with s is s', to first or second order; k (mpf) is that at the mean axis."""
-        normal, ellipse = self.states.normal, self.ellipse
+        normal, ellipse = self.normal, self.ellipse
         z = dot(normal, s)
-        first = as_factor(self.number(-rate)) * (ellipse.secular_factor * self._cubed * z)
-        if not second:
-            return [first * x for x in normal]
-        # (k^2 / 4) c1 (1 - 3 z^2)
-        across = ellipse.across * (self._cubed * self._cubed) / ellipse.motion
-        factor = first + as_factor(self.number(rate * rate / 4)) * (across * (3.0 * (z * z) - 1.0))
-        return [factor * x for x in normal]
+        factor = self._times(-rate, ellipse.secular_factor * self.cubed) * z
+        if second:  # (k^2 / 4) c1 (1 - 3 z^2)
+            across = ellipse.across * (self.cubed * self.cubed) / ellipse.motion
+            factor = factor + self._times(rate * rate / 4, across) * (3.0 * (z * z) - 1.0)
+        found = [factor * x for x in normal]
+        if not second or self.apsides is None:
+            return found
+        p, t = self.apsides
+        x, y = dot(p, s), dot(t, s)
+        more = self._times(rate * rate / 4, steady(float(ellipse.eccentricity)) / ellipse.motion)
+        towards = zip(found, normal, p, t, strict=True)
+        return [g + more * ((x * x - y * y) * n + 2.0 * (z * (x * a - y * b))) for g, n, a, b in towards]
 
     def nutation(self, rate: Any, s: list[Symbolic]) -> list[Symbolic]:
         """See ``orbit_terms.nutation``; ``rate`` as above."""
         assert self.place is not None
         root = self.ellipse.root
-        size = self._cubed / (self.ellipse.motion * (root * root * root))
-        factor = as_factor(self.number(rate / 2)) * size
-        return nutation(hy, self.ellipse, self.place, factor, s, lambda x: x)
+        size = self._times(rate / 2, self.cubed / (self.ellipse.motion * (root * root * root)))
+        given = isinstance(root, hy.expression)
+        return nutation(hy, self.ellipse, self.place, size, s, (lambda x: x) if given else self.number)

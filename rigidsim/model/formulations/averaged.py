@@ -11,9 +11,13 @@ import heyoka as hy
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.averaged.applies import told_of_resonances
 from rigidsim.model.averaged.average import DIRECTION, Average, average_of
-from rigidsim.model.averaged.driven_mechanics import AMPLITUDES, DrivenMechanics
-from rigidsim.model.averaged.mechanics import AveragedMechanics
-from rigidsim.model.averaged.resonant_mechanics import SLOW, ResonantMechanics
+from rigidsim.model.averaged.mechanics import (
+    AMPLITUDES,
+    SLOW,
+    AveragedMechanics,
+    DrivenMechanics,
+    ResonantMechanics,
+)
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Requirements
 from rigidsim.model.frames import refuse_without_plane
 from rigidsim.model.load import Load
