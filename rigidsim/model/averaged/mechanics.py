@@ -134,7 +134,8 @@ class AveragedMechanics(Mechanics):
             return super().table(orbit)
         states = self._elements[orbit]
         terms = OrbitTerms.of_elements(states, self.number)
-        direction, inverse = [], hy.expression(1.0)
+        direction: list[Symbolic] = []
+        inverse = hy.expression(1.0)
         if terms.place is not None:
             direction, inverse = terms.place.seen(terms.ellipse.eccentricity, terms.ellipse.root)
             inverse = inverse / rounded(states.values[AXIS])
