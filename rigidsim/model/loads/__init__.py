@@ -6,19 +6,15 @@ from rigidsim.model import flight_names, shadows  # noqa: F401  (names in expres
 from rigidsim.model.load import Load, Term
 from rigidsim.model.loads import (  # noqa: F401  (each enters its kind; a new load is one line more here)
     applied,
-    body_field,
-    drag,
-    eddy_currents,
+    attraction,
     elasticity,
     fluid_core,
     gravity,
-    magnetic_dipole,
+    magnetic_field,
     mass_loss,
     moved_mass,
-    radiation_pressure,
     rotor,
-    source_field,
-    source_figure,
+    surface_load,
     uniform_gravity,
     viscous_torque,
 )

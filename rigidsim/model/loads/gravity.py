@@ -7,15 +7,17 @@ from typing import Any, Literal
 from pydantic import Field, StrictInt
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.loads.attraction import Attraction
-from rigidsim.model.loads.source_field import SourceFieldTable
-from rigidsim.model.loads.source_figure import SourceFigureTable
+from rigidsim.model.loads.attraction import Attraction, SourceFieldTable, SourceFigureTable
 from rigidsim.model.placements.flight import FlownAbout, FlownByKernel, FlownByMass
 from rigidsim.model.placements.kernel_body import PlacedByKernel, kernel_body, refuse_series
-from rigidsim.model.placements.placement import Placement
-from rigidsim.model.placements.point_mass import PlacedAsMass
-from rigidsim.model.placements.prescribed_orbit import PlacedAtRest, PlacedByTable, PlacedOnOrbit
-from rigidsim.model.placements.series import PlacedBySeries
+from rigidsim.model.placements.placement import (
+    PlacedAsMass,
+    PlacedAtRest,
+    PlacedBySeries,
+    PlacedByTable,
+    PlacedOnOrbit,
+    Placement,
+)
 from rigidsim.scene.bodies.gravity_field import MOST
 from rigidsim.scene.epochs import J2000
 from rigidsim.scene.exact import ZERO

@@ -1,5 +1,5 @@
-"""A magnetic field as loads know it: uniform, of a dipole along an orbit or in flight, or the Earth's; and
-``bx by bz``, the field where the body is, body axes.
+"""Magnetic fields: uniform, of a dipole along an orbit or in flight, or the Earth's; what they do to a
+magnetic moment and to a conductor that turns; and ``bx by bz``, the field where the body is, body axes.
 """
 
 from __future__ import annotations
@@ -16,37 +16,43 @@ from pydantic import Field, StrictInt, Tag
 
 from rigidsim.model.harmonics import TurningHarmonics
 from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.load import Term
 from rigidsim.model.load_words import length_text, value_text
+from rigidsim.model.loads.attraction import Placed
 from rigidsim.model.loads.gravity import CentralGravity, CentralGravityFields
-from rigidsim.model.loads.placed import Placed
+from rigidsim.model.names import written
 from rigidsim.model.placements.flight import FlownAbout
-from rigidsim.model.placements.placement import NOWHERE, Placement
-from rigidsim.model.placements.prescribed_orbit import PlacedOnOrbit
+from rigidsim.model.placements.placement import NOWHERE, PlacedOnOrbit, Placement
 from rigidsim.model.rotations import Symbolic, along
 from rigidsim.model.sources import free_flight, in_body_axes, read_in
 from rigidsim.model.two_part import as_factor, rounded
-from rigidsim.scene.arithmetic import Vector, apply, dot, norm, transpose
+from rigidsim.scene.arithmetic import Vector, apply, cross, diagonal, dot, norm, transpose, unit_vectors
 from rigidsim.scene.bodies.presets import EARTH
 from rigidsim.scene.earth_axes import earth_axes, rotation_rate
 from rigidsim.scene.effect_parts import EffectPart, degree_parts
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import PLACES, NameProvider, Readable, provides
+from rigidsim.scene.expressions.tree import Constant, Expression, states_read
 from rigidsim.scene.fields import (
     NAME_OR_VECTOR,
     GravitationalParameter,
     InUnit,
     Metre,
+    NotNegative,
+    NumberOrFormula,
     Positive,
     Rule,
     Triple,
+    excludes,
     name_or_vector,
     one_of,
+    together,
 )
 from rigidsim.scene.geomagnetic_field import MOST, RADIUS, igrf
 from rigidsim.scene.orbit_keys import OrbitFields
 from rigidsim.scene.orbits import resolve_orbit
-from rigidsim.scene.registry import Setting
+from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.tracing.numbers import plain
@@ -424,3 +430,199 @@ def _fields_of(scene: Scene) -> list[InMagneticField]:
         if isinstance(load, InMagneticField) and not any(load.field == x.field for x in found):
             found.append(load)
     return found
+
+
+class MagneticDipoleFields(MagneticFieldFields):
+    """Torque m x B on a dipole of the body, in a uniform ``field`` (space axes), or in the field of a centred
+    dipole ``source_moment`` (space axes) around which the body moves on an orbit, or in flight as it flies.
+    """
+
+    kind: Literal["magnetic_dipole"]
+    moment: Triple[Annotated[Any, NumberOrFormula("A m^2")]] = Field(
+        description="magnetic moment of the body, body axes: numbers, or expressions of t, the state, "
+        "bx by bz and [parameters], such as a law of magnetorquers; zero for a field alone",
+        examples=[["0 A m^2", "0 A m^2", "0.5 A m^2"]],
+    )
+
+
+@register_load
+@dataclass(frozen=True, kw_only=True)
+class MagneticDipole(InMagneticField):
+    """Torque m x B, potential -m . B (Jackson, Classical Electrodynamics, sections 5.6 and 5.7)."""
+
+    moment: Vector  # m, body axes, A m^2 (mpf)
+    Fields = MagneticDipoleFields
+    title = "magnetic_dipole"
+
+    @classmethod
+    def resolve(cls, fields: MagneticDipoleFields, around: Setting) -> MagneticDipole:
+        if any(isinstance(x, str) for x in fields.moment):
+            moment, law = [around.context.zero] * 3, tuple(_law(fields.moment, around))
+            return SteeredDipole.within(fields, around, moment=moment, law=law)
+        return cls.within(fields, around, moment=numbers(fields.moment, around))
+
+    def acts(self) -> bool:
+        return any(x != 0 for x in self.moment) and any(x != 0 for x in self.field.source)
+
+    @property
+    def conservative(self) -> bool:  # type: ignore[override]
+        """Whether the field is uniform: along a flight its torque does work without a force."""
+        return self.field.uniform or not self.acts()
+
+    def _moment(self, m: Kinematics) -> Vector:
+        """m times the field's size, internal units of energy."""
+        size, exponent = self.field.size(m.scene), -m.scaling.energy
+        return [m.scene.context.ldexp(x * size, exponent) for x in self.moment]
+
+    def torque(self, m: Kinematics) -> list[Term]:
+        if not self.acts():
+            return []
+        moment, axes = self._moment(m), unit_vectors(m.scene.context)
+        return [(cross(moment, axis), b) for axis, b in zip(axes, self.b(m), strict=True)]
+
+    def potential(self, m: Kinematics) -> Symbolic | None:
+        if not self.acts():
+            return None
+        pairs = zip(self._moment(m), self.b(m), strict=True)
+        return -hy.sum([m.number(x) * b for x, b in pairs if x != 0])
+
+    def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
+        return (self.moment, self.field.source) if self.field.uniform else None
+
+    def amplitude(self, scene: Scene) -> Any:
+        """Largest 2 m B."""
+        return 2 * norm(scene.context, self.moment) * self.field.most(scene)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteeredDipole(MagneticDipole):
+    """A moment given by expressions, as by a law of magnetorquers."""
+
+    law: tuple[Expression, ...] = ()  # its components, A m^2, body axes
+    conservative = False
+
+    def acts(self) -> bool:
+        return any(x != 0 for x in self.field.source)
+
+    def read_by(self, names: frozenset[str]) -> bool:
+        return False
+
+    @property
+    def reads(self) -> frozenset[str]:  # type: ignore[override]
+        return super().reads | states_read(*self.law)
+
+    def torque(self, m: Kinematics) -> list[Term]:
+        size = m.scene.context.ldexp(self.field.size(m.scene), -m.scaling.energy)
+        return list(zip(diagonal([size] * 3), cross(written(m, self.law), self.b(m)), strict=True))
+
+    def potential(self, m: Kinematics) -> Symbolic | None:
+        return None
+
+    def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
+        return None
+
+    def amplitude(self, scene: Scene) -> Any | None:
+        return None
+
+
+def _law(given: list[Any], around: Setting) -> Iterator[Expression]:
+    """Components of a moment, of which some are expressions."""
+    for i, x in enumerate(given):
+        yield Constant(x) if isinstance(x, ExactNumber) else around.expression(f"moment[{i}]", x, "A m^2")
+
+
+Conductivity = Annotated[ExactNumber, InUnit("S/m")]
+MagneticTensor = Annotated[ExactNumber, InUnit("S m^4")]
+
+
+class EddyCurrentsFields(MagneticFieldFields):
+    """Torque (M (w x B)) x B of the currents that a magnetic field induces in a conductor turning in it."""
+
+    rules = (
+        *MagneticFieldFields.rules,
+        one_of("conductivity", "magnetic_tensor", why="the latter for a conductor that is no sphere"),
+        excludes("magnetic_tensor", "radius", "thickness"),
+        together("conductivity", "radius"),
+    )
+    kind: Literal["eddy_currents"]
+    conductivity: NotNegative[Conductivity] | None = Field(
+        default=None, description="of a conducting sphere, with its radius", examples=["3.5e7 S/m"]
+    )
+    radius: Positive[Metre] | None = Field(
+        default=None, description="of the sphere, outside", examples=["30 cm"]
+    )
+    thickness: Positive[Metre] | None = Field(
+        default=None, description="of the wall of a hollow sphere; a solid one without it", examples=["2 mm"]
+    )
+    magnetic_tensor: Triple[NotNegative[MagneticTensor]] | None = Field(
+        default=None,
+        description="moments of M about the body axes, of another conductor, instead of conductivity and "
+        "radius",
+        examples=[["2.1e4 S m^4", "2.1e4 S m^4", "9.8e3 S m^4"]],
+    )
+
+
+@register_load
+@dataclass(frozen=True, kw_only=True)
+class EddyCurrents(InMagneticField):
+    """Torque (M (w x B)) x B on a conductor whose currents follow the field without delay.
+
+    A sphere's M is (2 pi / 15) s (R^5 - (R - d)^5): the induced electric field -r x B' / 2 is tangent to all
+    spheres, so each layer has its own currents (Landau & Lifshitz, Electrodynamics of Continuous Media,
+    section 63).
+    """
+
+    moments: Vector  # of M, body axes, S m^4 (mpf)
+    Fields = EddyCurrentsFields
+    title = "eddy_currents"
+    unaveraged = "the torque of eddy currents has no average", "leave it out, use viscous_torque"
+
+    @classmethod
+    def resolve(cls, fields: EddyCurrentsFields, around: Setting) -> EddyCurrents:
+        if fields.magnetic_tensor is not None:
+            moments = numbers(fields.magnetic_tensor, around)
+        else:
+            moments = [_of_sphere(fields, around)] * 3
+        return cls.within(fields, around, moments=moments)
+
+    def acts(self) -> bool:
+        return any(x != 0 for x in self.moments) and any(x != 0 for x in self.field.source)
+
+    def torque(self, m: Kinematics) -> list[Term]:
+        """Sum over axes k, l of the constant vectors M_k e_k x e_l times (w x b)_k b_l, b the field over its
+        size.
+        """
+        if not self.acts():
+            return []
+        context, b, terms = m.scene.context, self.b(m), []
+        scale, axes = context.ldexp(self.field.size(m.scene) ** 2, -m.scaling.momentum), unit_vectors(context)
+        induced = cross(m.rates, b)
+        for k, moment in enumerate(self.moments):
+            for n, axis in enumerate(axes):
+                if moment != 0 and n != k:
+                    vector = cross([scale * moment * x for x in axes[k]], axis)
+                    terms.append((vector, induced[k] * b[n]))
+        return terms
+
+    def direction(self, scene: Scene) -> Vector | None:
+        return self.field.source if self.field.uniform else None
+
+    def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
+        """False: it damps any spin across the field."""
+        return False
+
+    def amplitude(self, scene: Scene) -> Any:
+        return scene.context.zero  # it only removes energy
+
+
+def _of_sphere(fields: EddyCurrentsFields, around: Setting) -> Any:
+    assert fields.conductivity is not None
+    assert fields.radius is not None
+    context, radius = around.context, fields.radius.at(around.context)
+    inside = context.zero
+    if fields.thickness is not None:
+        inside = radius - fields.thickness.at(context)
+        if inside < 0:
+            what = f"given {float(fields.thickness):g}; more than 0, up to the radius, is allowed"
+            raise around.fault("thickness", what)
+    return 2 * context.pi / 15 * fields.conductivity.at(context) * (radius**5 - inside**5)

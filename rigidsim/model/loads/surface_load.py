@@ -4,25 +4,63 @@ normals of plates.
 The expressions read names, as a user's own do (``rigidsim.scene.expressions.names``): directions of sources,
 shadows, the velocity relative to the air. So their kinks and jumps, at which a plate comes out of the light
 or the stream, are surfaces on which steps end, and the states that they take are carried.
+
+**Drag.** A plate of area A with unit normal n moves through the air with velocity v, and is met by it if n .
+v > 0: the force is -rho C A (n . v) v / 2, that of the area seen against the stream; a sphere's is -rho C pi
+R^2 |v| v / 2 (Montenbruck & Gill, Satellite Orbits, 2000, section 3.5).
+
+**Radiation pressure.** A plate, met by light from direction u with c = n . u > 0, is pushed by
+
+    F = -P A c ((1 - s) u + 2 (s c + d/3) n)
+
+with the shares s reflected and d scattered by Lambert's law (Montenbruck & Gill, section 3.4; Wertz,
+Spacecraft Attitude Determination and Control, 1978, section 17.2.2); the integral over a sphere is -P pi R^2
+(1 + 4 d/9) u. P is the irradiance over the speed of light, which falls with the square of the distance.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from fractions import Fraction
+from typing import Annotated, Any, Literal
 
 import heyoka as hy
+from pydantic import Field, StrictBool
 
+from rigidsim.model.air_density import AIR_DENSITY, INDICES, LEAST, NRLMSISE, height
+from rigidsim.model.flight_names import RELATIVE_NAMES, flown_about
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.load import Load, Term
+from rigidsim.model.load import Load, Term, loads_of
+from rigidsim.model.loads.applied import Applied
+from rigidsim.model.loads.attraction import Attraction
 from rigidsim.model.names import written
+from rigidsim.model.plausibility import about_altitude
 from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm
 from rigidsim.scene.bodies.outside import OuterSurface, Plate
+from rigidsim.scene.bodies.presets import known_body
+from rigidsim.scene.cautions import Caution
+from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions.tree import Expression, states_read
-from rigidsim.scene.registry import Setting
+from rigidsim.scene.expressions.tree import Expression, evaluate, names_used, states_read
+from rigidsim.scene.fields import (
+    Dimensionless,
+    InUnit,
+    Metre,
+    NotNegative,
+    NumberOrFormula,
+    Positive,
+    VariableName,
+    together,
+    within,
+)
+from rigidsim.scene.initial_values import start_values
+from rigidsim.scene.point_masses import kepler_reach
+from rigidsim.scene.registry import LoadFields, Setting, register_load
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.transitions import WIDE, narrow_parts, root_parts
 
 Sum = Mapping[Expression, Any]
 """A sum of expressions times coefficients (mpf)."""
@@ -200,3 +238,230 @@ class Pushes:
     def parsed(self, text: str, **options: Any) -> Expression:
         """The expression of a text, in which no parameters of the config stand."""
         return self.around.expression(self._title, text, **{"parameters": None, **options})
+
+
+_FALLING = 2.0**-10  # ratio of the least to the largest distance of an orbit that all but meets the centre
+_PLACES = 16  # along an orbit, between which what reads the altitude is smooth
+
+Density = Annotated[Any, NumberOrFormula("kg/m^3")]
+
+
+class DragFields(LoadFields):
+    """Drag on the body's surfaces of the air about the body that it flies about."""
+
+    rules = (together("altitude", "scale_height"), together("f107", "f107a", "ap"))
+    kind: Literal["drag"]
+    density: Density = Field(
+        description="of the air: a number, an expression of altitude, t, the state and [parameters], or "
+        '"nrlmsise00", the Earth\'s by that model',
+        examples=["4e-12 kg/m^3", "nrlmsise00"],
+    )
+    f107: Annotated[Dimensionless, within("60", "400")] | None = Field(
+        default=None,
+        description="of nrlmsise00: solar flux at 10.7 cm of the day before, 1e-22 W/m^2/Hz",
+        examples=[150],
+    )
+    f107a: Annotated[Dimensionless, within("60", "400")] | None = Field(
+        default=None, description="of nrlmsise00: its mean of 81 days", examples=[150]
+    )
+    ap: Annotated[Dimensionless, within("0", "400")] | None = Field(
+        default=None, description="of nrlmsise00: the day's geomagnetic index Ap", examples=[7]
+    )
+    scale_height: Positive[Metre] | None = Field(
+        default=None,
+        description="height over which the density falls to 1/e; by default density holds everywhere",
+        examples=["60 km"],
+    )
+    altitude: Metre | None = Field(
+        default=None, description="where the air has this density; with scale_height", examples=["400 km"]
+    )
+
+
+@register_load
+@dataclass(frozen=True)
+class Drag(SurfaceLoad):
+    """Drag on plates and spheres; ``law`` is the density, where an expression gives it."""
+
+    law: Expression | None = None
+    Fields = DragFields
+    title = "drag"
+
+    @classmethod
+    def resolve(cls, fields: DragFields, around: Setting) -> Drag:
+        if not around.free_flight or RELATIVE_NAMES[0] not in around.names:
+            what = "given without a velocity relative to the air; it takes [initial] position and velocity, "
+            raise around.fault("", what + "and a central_gravity (atmosphere_rate there turns the air)")
+        pushes = Pushes(around, cls.title, RELATIVE_NAMES)
+        half, factors, law = around.context.one / 2, [], None
+        if (fields.density == NRLMSISE) != (fields.ap is not None):
+            given = "missing" if fields.ap is None else f"given with another density than {NRLMSISE}"
+            raise around.fault("ap", f'{given}; density = "{NRLMSISE}" takes {", ".join(INDICES)}')
+        if fields.density == NRLMSISE:
+            factors.append(pushes.parsed(AIR_DENSITY))
+        elif isinstance(fields.density, ExactNumber):
+            if fields.density.sign < 0:
+                what = f"given {float(fields.density):g}; zero or more is allowed"
+                raise around.fault("density", what)
+            half = half * fields.density.at(around.context)
+        else:
+            law = around.expression("density", fields.density, "kg/m^3")
+            factors.append(law)
+        factors += _falling(fields, around)
+        for number, surface in pushes.surfaces():
+            size = -half * surface.drag_coefficient * surface.area
+            if isinstance(surface, Plate):
+                pushes.on_plate(surface, number, size)
+            else:
+                pushes.on_sphere(surface, size, speed=True)
+        kind = DragInThermosphere if fields.density == NRLMSISE else cls
+        return kind(pushes.acting(), pushes.stream, tuple(factors), around.free_flight, law)
+
+    def narrow(self, m: Kinematics) -> list[Symbolic]:
+        """What is narrow in it, but for what reads the altitude alone and changes by less than a transition
+        along the orbit at the start: no step is longer than that orbit.
+        """
+        parts, reach = narrow_parts(*self.formulas()), _altitudes(m.scene)
+        return written(m, [part for part in parts if reach is None or _range(part, reach, m.scene) > WIDE])
+
+    def roots(self, m: Kinematics) -> list[Symbolic]:
+        """Of the density alone in an orbit, where the speed of the air vanishes by coincidence only."""
+        if _altitudes(m.scene) is None:
+            return super().roots(m)
+        return written(m, root_parts(*self.never_negative()))
+
+    def never_negative(self) -> list[Expression]:
+        return [] if self.law is None else [self.law]
+
+    def cautions(self, fields: DragFields, where: str, scene: Scene) -> Iterator[Caution]:
+        attractors = (x for x in scene.config.loads if getattr(x, "kind", "") == "central_gravity")
+        strengths = (getattr(x, "gravitational_parameter", None) for x in attractors)
+        known = any(x is not None and known_body(float(x)) is not None for x in strengths)
+        if known and fields.altitude is not None:
+            start = start_values(scene)["altitude"]
+            yield from about_altitude(fields.altitude, float(start), where)
+
+
+class DragInThermosphere(Drag):
+    """Drag in NRLMSISE-00, which ends where the network of it does."""
+
+    def range_ends(self, m: Kinematics) -> list[tuple[str, Symbolic]]:
+        why = f"the altitude fell below {LEAST:g} km, from which NRLMSISE-00 is known here"
+        return [(why, (height(m) - LEAST) / LEAST + 2.0**-20)]  # 14 cm: a run may start at the limit
+
+
+def _altitudes(scene: Scene) -> tuple[Any, Any] | None:
+    """Least and largest altitude (m, mpf) of the Kepler orbit at the start; None if it falls to the centre or
+    leaves, or where a thrust or another body may change it.
+    """
+    source, context = flown_about(scene.config), scene.context
+    load = None if source is None else source.of(scene)
+    others = [x for x in loads_of(scene) if x is not load]
+    if source is None or load is None or load.attracting_point is None or any(map(_steers, others)):
+        return None
+    place = [-x for x in load.source_at_start(scene)]
+    least, largest = kepler_reach(context, place, load.motion_at_start(scene), load.gravitational_parameter)
+    if largest is None or least < largest * _FALLING:
+        return None
+    surface = source.radius(context) if source.extended else context.zero
+    return least - surface, largest - surface
+
+
+def _steers(load: Load) -> bool:
+    """Whether a load may change an orbit by much: a thrust, a body, or what Python gives."""
+    if isinstance(load, Applied):
+        return load.pushes
+    return (isinstance(load, Attraction) and load.pulls) or not type(load).__module__.startswith("rigidsim.")
+
+
+def _range(part: Expression, reach: tuple[Any, Any], scene: Scene) -> float:
+    """Change of a part along a range of altitudes; infinite if it reads anything else."""
+    context, (low, high) = scene.context, reach
+    if names_used(part) != {"altitude"}:
+        return math.inf
+    places = [low + (high - low) * n / _PLACES for n in range(_PLACES + 1)]
+    found = [evaluate(part, {"altitude": place}, context) for place in places]
+    return float(context.maximum(found) - context.minimum(found))
+
+
+def _falling(fields: DragFields, around: Setting) -> list[Expression]:
+    """The factor by which the density falls with the altitude, if it does."""
+    if fields.scale_height is None or fields.altitude is None:
+        return []
+    if not isinstance(fields.density, ExactNumber):
+        what = "given with an expression for density, which determines its fall; remove it and altitude"
+        raise around.fault("scale_height", what)
+    if "altitude" not in around.names:
+        what = "given without a surface to count from; give the central_gravity a radius"
+        raise around.fault("altitude", what)
+    given = {"base": fields.altitude.alone, "scale_height": fields.scale_height.alone}
+    return [around.expression("drag", "exp((base - altitude)/scale_height)", parameters=given)]
+
+
+SPEED_OF_LIGHT = 299792458  # m/s, exact
+_AU = 149597870700  # m, exact (IAU 2012)
+_SUN = ExactNumber(Fraction(1361))
+"""Irradiance at 1 au, W/m^2: 1360.8 +- 0.5 (Kopp & Lean, Geophysical Research Letters 38, L01706, 2011)."""
+Irradiance = Annotated[ExactNumber, InUnit("W/m^2")]
+
+
+class RadiationPressureFields(LoadFields):
+    """Light of a named source on the body's surfaces: absorbed, reflected and scattered."""
+
+    kind: Literal["radiation_pressure"]
+    light: VariableName = Field(
+        description="name of the load whose source shines, as the Sun's gravity_gradient with name = "
+        '"sun"; its shadow_NAME counts where the scene has one',
+        examples=["sun"],
+    )
+    irradiance: NotNegative[Irradiance] = Field(
+        default=_SUN,
+        description="at 1 au; the Sun's by default",
+        examples=["1361 W/m^2"],
+        json_schema_extra={"default": 1361},
+    )
+    shadow: StrictBool = Field(default=True, description="whether shadow_NAME counts where the scene has it")
+
+
+@register_load
+@dataclass(frozen=True)
+class RadiationPressure(SurfaceLoad):
+    """Light of a named source on plates and spheres."""
+
+    light: str
+    Fields = RadiationPressureFields
+    title = "radiation_pressure"
+
+    @staticmethod
+    def effect_parts(fields: RadiationPressureFields) -> Iterator[EffectPart]:
+        missing = "" if fields.shadow else "it is left out by shadow = false"
+        yield EffectPart("shadow", "shadow on that light", {"shadow": False}, missing=missing)
+
+    @classmethod
+    def resolve(cls, fields: RadiationPressureFields, around: Setting) -> RadiationPressure:
+        name = fields.light
+        if f"r_{name}" not in around.names:
+            known = [x.removeprefix("r_") for x in around.names if x.startswith("r_")]
+            have = f"sources of this scene: {', '.join(known)}" if known else "this scene has no named source"
+            what = (
+                f'given "{name}", which is no source; {have}. A load such as a gravity_gradient on an orbit '
+            )
+            raise around.fault("light", f'{what}with name = "{name}" says where it is')
+        pushes = Pushes(around, cls.title, [f"u{axis}_{name}" for axis in "xyz"])
+        pressure = fields.irradiance.at(around.context) / SPEED_OF_LIGHT
+        for number, surface in pushes.surfaces():
+            _push(pushes, number, surface, pressure)
+        factors = [pushes.parsed(f"({_AU}/r_{name})^2")]
+        if fields.shadow and f"shadow_{name}" in around.names:
+            factors.append(pushes.parsed(f"shadow_{name}"))
+        return cls(pushes.acting(), pushes.stream, tuple(factors), around.free_flight, name)
+
+
+def _push(pushes: Pushes, number: int, surface: OuterSurface, pressure: Any) -> None:
+    size = pressure * surface.area
+    if not isinstance(surface, Plate):
+        pushes.on_sphere(surface, -size * (1 + 4 * surface.diffuse / 9))
+        return
+    normal = surface.unit(pushes.around.context)
+    pushes.on_plate(surface, number, -size * (1 - surface.specular))
+    pushes.on_plate(surface, number, -2 * size * surface.specular, normal, power=2)
+    pushes.on_plate(surface, number, -2 * size * surface.diffuse / 3, normal)

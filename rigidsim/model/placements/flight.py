@@ -11,8 +11,7 @@ from typing import Any, ClassVar
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.orbits.point_mass_states import Pull
 from rigidsim.model.placements.kernel_body import PlacedByKernel
-from rigidsim.model.placements.placement import Placement, SourcePlace
-from rigidsim.model.placements.point_mass import AmongMasses
+from rigidsim.model.placements.placement import AmongMasses, Placement, SourcePlace
 from rigidsim.model.rotations import Symbolic, length
 from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.kernels.reading import Sight
