@@ -101,6 +101,12 @@ class ConfigError(RigidsimError):
         return ConfigError(self.problems, source)
 
 
+def ensure(holds: object, error: Exception) -> None:
+    """Raise an error unless a condition holds."""
+    if not holds:
+        raise error
+
+
 class MemberError(ConfigError):
     """A member of a sweep can't be run; ``problems`` name the member besides the key."""
 

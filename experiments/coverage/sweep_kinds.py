@@ -5,7 +5,7 @@ gyrostats, and laws with states of their own.
 from dataclasses import dataclass
 
 from rigidsim.scene.config import parse
-from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.sweep import Sweep
 
 _HEAD = """
 name = "{kind}"

@@ -7,7 +7,7 @@ here and rounded once, to the working precision, where it enters the equations.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import mpmath
@@ -93,6 +93,21 @@ def dot(a: Vector, b: Vector) -> Any:
 def norm(context: Any, a: Vector) -> Any:
     """Euclidean norm."""
     return context.sqrt(dot(a, a))
+
+
+def vector(context: Any, given: Sequence[Any] | None) -> Vector:
+    """Exact numbers of a config as mpf; zero for none."""
+    return [x.at(context) for x in given] if given else [context.zero] * 3
+
+
+def plus(a: Vector, b: Vector) -> Vector:
+    """Sum of vectors."""
+    return [x + y for x, y in zip(a, b, strict=True)]
+
+
+def minus(a: Vector, b: Vector) -> Vector:
+    """Difference of vectors."""
+    return [x - y for x, y in zip(a, b, strict=True)]
 
 
 def unit_vectors(context: Any) -> Matrix:

@@ -16,8 +16,7 @@ from pydantic import ValidationError
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import validation_messages as messages
-from rigidsim.scene.bodies.field_files import cut
-from rigidsim.scene.bodies.gravity_field import asked_degree
+from rigidsim.scene.bodies.gravity_field import asked_degree, cut
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import NAME_OR_VECTOR
 from rigidsim.scene.kernels.reading import EMBEDDED, folders_of

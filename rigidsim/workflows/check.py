@@ -6,7 +6,7 @@ from typing import Any
 
 from rigidsim.accuracy.choice import fully
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.sweep import Sweep
 from rigidsim.session.dataset import refuse_taken_names
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, told_loads
 from rigidsim.solve.problem import prepare

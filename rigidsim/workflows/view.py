@@ -9,7 +9,7 @@ import xarray
 
 from rigidsim.errors import RigidsimError, RunFolderError
 from rigidsim.look import viewer
-from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.sweep import Sweep
 from rigidsim.store import pictures
 from rigidsim.store.fits import is_fit
 from rigidsim.store.pictures import Told
@@ -53,7 +53,7 @@ def _members(paths: Sequence[Path], members: Sequence[int]) -> list[tuple[str, R
     sweep, named = Sweep.of(experiment), list[tuple[str, Run]]()
     for member in dict.fromkeys(members):
         one = single_member(experiment, member)
-        said = "; ".join(filter(None, (one.config.description, sweep.told(member))))
+        said = "; ".join(filter(None, (one.config.description, sweep.described(member))))
         named.append((f"member {member}", run(one.replace({"description": said}), out=None)))
     return named
 

@@ -6,7 +6,7 @@ from support import cases
 
 from experiments.sweep_coverage import KINDS, Found, found_of
 from rigidsim import parse
-from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.sweep import Sweep
 from rigidsim.workflows.sweeps.members import MemberResults, run_members, warning_bits
 
 MEMBERS = 6

@@ -13,7 +13,7 @@ from experiments.random_scenes import random_scene
 from rigidsim import parse
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.scene import build_scene
-from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.sweep import Sweep
 from rigidsim.session.understood import cautions_of
 
 ROOT = Path(__file__).parents[2]

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigidsim import ConfigError, parse
-from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.sweep import Sweep
 
 BASE = """\
 name = "box"
@@ -96,7 +96,7 @@ def test_directions_lie_on_the_sphere_and_cover_it() -> None:
     for how, count in (("count = 600", 600), ("grid = [20, 30]", 600)):
         sweep = swept(table % how)
         points = [sweep.axes[0].exact(index) for index in range(count)]
-        assert sweep.axes[0].values.components == 3
+        assert sweep.axes[0].components == 3
         for point in points:
             square = sum(x.rational**2 for x in point)
             assert abs(square - 4) < Fraction(1, 10**37)

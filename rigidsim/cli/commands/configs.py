@@ -14,7 +14,7 @@ from rigidsim.cli.screens.summary import print_checked
 from rigidsim.cli.screens.sweeps import print_sweep_plan
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.editor_schema import editor_schema
-from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.sweep import Sweep
 from rigidsim.workflows.physics.required import required_physics
 from rigidsim.workflows.read import load
 from rigidsim.workflows.ready_scenes import by_subject, write_new

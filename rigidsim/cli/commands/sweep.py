@@ -12,7 +12,7 @@ from rigidsim.cli.screens.summary import print_run, print_verdict
 from rigidsim.cli.screens.sweeps import SweepProgress, print_sweep
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.sweeps.values import scanned
+from rigidsim.scene.sweep import scanned
 from rigidsim.session.progress import meter, watched
 from rigidsim.store.fits import is_fit
 from rigidsim.store.sweeps.folder import SavedSweep, is_sweep, open_sweep

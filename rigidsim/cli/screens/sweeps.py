@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 
 from rigidsim.cli.screens.page import Page, Styled
-from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.sweep import Sweep
 from rigidsim.session.progress import Meter, clock_text, left_text
 from rigidsim.store.sweeps.folder import FittedOfMembers, SavedSweep
 from rigidsim.workflows.fit.result import digits_text

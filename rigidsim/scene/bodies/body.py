@@ -1,7 +1,8 @@
 """Working out ``[body]``: mass, centre of mass, inertia tensor and principal axes about the reference point.
 
 The reference point is the one that the body turns about: the centre of mass, unless the config names
-another. Positions in the result are body axes, metres, from the reference point.
+another. Positions in the result are body axes, metres, from the reference point. A body is given by its
+tensor, or made of pieces (points, a shape, or parts placed and rotated), each with its own tensor.
 """
 
 from __future__ import annotations
@@ -12,24 +13,18 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.scene import attitude
-from rigidsim.scene.arithmetic import Matrix, Vector, apply, diagonal, eigen, multiply, transpose
+from rigidsim.scene.arithmetic import Matrix, Vector, diagonal, dot, eigen, minus, multiply, transpose, vector
 from rigidsim.scene.bodies import table as body_table
 from rigidsim.scene.bodies.gravity_field import GravityField
 from rigidsim.scene.bodies.outside import OuterSurface
-from rigidsim.scene.bodies.pieces import (
-    drawn,
-    parallel_axis,
-    pieces_of,
-    positive,
-    reference_point,
-    refusal,
-    refuse_dimensions,
-)
-from rigidsim.scene.bodies.presets import PRESETS
+from rigidsim.scene.bodies.presets import PRESETS, Preset
+from rigidsim.scene.bodies.shapes import DIMENSIONS, SHAPES
 from rigidsim.scene.exact import ExactNumber, exact_decimal, parse_number
 from rigidsim.scene.paths import numbers
 from rigidsim.scene.tracing.numbers import plain
+from rigidsim.scene.validation_messages import shown
 
 SOURCES = ("principal_moments", "inertia_tensor", "points", "shape", "parts", "preset")
 # A tensor that was printed by a double-precision program obeys the triangle inequality to about this.
@@ -72,6 +67,23 @@ class RigidBody:
     surfaces: tuple[OuterSurface, ...] = ()
 
 
+@dataclass
+class _Piece:
+    """Something with mass: tensor about its own centre of mass, along the body axes; its position is in the
+    coordinates in which the body is described (a shape's origin is its centre of mass).
+    """
+
+    mass: Any
+    position: Vector
+    inertia: Matrix
+    drawing: dict[str, Any]
+
+
+def refusal(key: str, text: str) -> ConfigError:
+    """The error that names a key of ``[body]``."""
+    return ConfigError(Problem(f"[body] {key}".strip(), text))
+
+
 def build_body(
     table: body_table.Body, context: Any, sequence: str = "zxz", moments: Vector | None = None
 ) -> RigidBody:
@@ -81,49 +93,42 @@ def build_body(
         sequence: of Euler angles for parts that name none.
         moments: principal moments at the start, if some are expressions (mpf).
     """
-    given = [name for name in SOURCES if getattr(table, name) is not None]
     preset = PRESETS[str(table.preset)] if table.preset is not None else None
-    own = [name for name in given if name != "preset"]  # they take the place of a preset's moments
-    if len(own) > 1 or not given:
-        found = " and ".join(own) if own else "no source of inertia"
-        beside = ", with a preset at most one of the others" if preset else ""
-        raise refusal("", f"given {found}; exactly one of {', '.join(SOURCES)} is needed{beside}")
+    own = [name for name in SOURCES[:-1] if getattr(table, name) is not None]
+    found = " and ".join(own) or "no source of inertia"
+    beside = ", with a preset at most one of the others" if preset else ""
+    what = f"given {found}; exactly one of {', '.join(SOURCES)} is needed{beside}"
+    ensure(len(own) == 1 or (preset and not own), refusal("", what))
     source = own[0] if own else "preset"
     if source != "shape":
-        refuse_dimensions(table, (), "which only a shape has", "")
-    if source in ("principal_moments", "inertia_tensor") or (
-        source == "preset" and preset and not preset.parts
-    ):
-        return _from_tensor(table, source, context, moments)
-    if table.center_of_mass is not None:
-        what = f"it follows from {source}; remove it, and say with reference what the body turns about"
-        raise refusal("center_of_mass", what)
-    if source in ("points", "parts") and table.mass is not None:
-        raise refusal("mass", f"it follows from {source}; remove it")
+        _refuse_dimensions(table, (), "which only a shape has", "")
+    if not own and preset and preset.parts:
+        parts = [body_table.Part.model_validate(dict(part)) for part in preset.parts]
+        return _from_pieces(table.model_copy(update={"parts": parts}), "parts", context, sequence, preset)
+    if source not in ("points", "shape", "parts"):
+        return _from_tensor(table, source, context, preset, moments)
+    ensure(source == "shape" or table.mass is None, refusal("mass", f"it follows from {source}; remove it"))
+    if preset and source == "shape" and table.mass is None and preset.mass:
+        table = table.model_copy(update={"mass": parse_number(preset.mass, "kg")})
     return _from_pieces(table, source, context, sequence)
 
 
 def _from_tensor(
-    table: body_table.Body, source: str, context: Any, moments: Vector | None = None
+    table: body_table.Body, source: str, context: Any, preset: Preset | None, moments: Vector | None
 ) -> RigidBody:
-    if table.reference is not None:
-        what = f"only shape, points and parts take it; {source} is taken about the point that the body turns "
-        raise refusal("reference", what + "about already: remove it")
-    zero = [context.zero] * 3
-    center = [x.at(context) for x in table.center_of_mass] if table.center_of_mass else zero
-    mass = positive(table.mass, "mass", "mass", context) if table.mass is not None else None
-    drawing: list[dict[str, Any]] = []
-    preset = PRESETS[str(table.preset)] if table.preset is not None else None
+    what = f"only shape, points and parts take it; {source} is taken about the point that the body turns "
+    ensure(table.reference is None, refusal("reference", what + "about already: remove it"))
+    center = vector(context, table.center_of_mass)
+    mass = None if table.mass is None else table.mass.at(context)
     if source == "preset" and preset:
         inertia = preset.inertia(context, mass)
     elif source == "principal_moments":
-        assert table.principal_moments is not None
-        numbers = [x for x in table.principal_moments if isinstance(x, ExactNumber)]
-        inertia = diagonal(moments or [x.at(context) for x in numbers])
+        inertia = diagonal(moments or vector(context, table.principal_moments))
     else:
         assert table.inertia_tensor is not None
         _check_symmetric(table.inertia_tensor)
-        inertia = [[x.at(context) for x in row] for row in table.inertia_tensor]
+        inertia = [vector(context, row) for row in table.inertia_tensor]
+    drawing: list[dict[str, Any]] = []
     if preset and preset.parts:
         whole = build_body(body_table.Body.model_validate({"preset": table.preset}), context)
         mass, drawing = whole.mass if mass is None else mass, whole.drawing
@@ -132,102 +137,168 @@ def _from_tensor(
         if preset.semi_axes:
             axes = [float(parse_number(a, "m").at(context)) for a in preset.semi_axes]
             name = preset.drawn_as or str(table.preset)
-            drawing = [{**drawn("ellipsoid", {"semi_axes": axes}, center), "name": name}]
-    return _finish(context, table, source, _told(table, source), mass, center, inertia, drawing)
-
-
-def _told(table: body_table.Body, source: str) -> str:
-    """Where the inertia comes from, with a preset's reference and what else stands in its place."""
-    if table.preset is None:
-        return source
-    told = f"preset {table.preset} ({PRESETS[str(table.preset)].source})"
-    if source != "preset":
-        return f"{source} beside {told}"
-    return f"{told}, with the mass of the config" if table.mass is not None else told
+            drawing = [{**_drawn("ellipsoid", {"semi_axes": axes}, center), "name": name}]
+    return _finish(context, table, source, mass, center, inertia, drawing)
 
 
 def _check_symmetric(tensor: list[list[ExactNumber]]) -> None:
-    for i in range(3):
-        for j in range(i):
-            if tensor[i][j] != tensor[j][i]:
-                raise refusal(
-                    f"inertia_tensor[{i}][{j}]",
-                    f"given {float(tensor[i][j])!r}, but [{j}][{i}] is {float(tensor[j][i])!r}; "
-                    "the tensor must be symmetric: write the same number twice",
-                )
+    for i, j in ((1, 0), (2, 0), (2, 1)):
+        what = (
+            f"given {float(tensor[i][j])!r}, but [{j}][{i}] is {float(tensor[j][i])!r}; the tensor must be "
+        )
+        what += "symmetric: write the same number twice"
+        ensure(tensor[i][j] == tensor[j][i], refusal(f"inertia_tensor[{i}][{j}]", what))
 
 
-def _from_pieces(table: body_table.Body, source: str, context: Any, sequence: str) -> RigidBody:
-    pieces = pieces_of(
-        _with_parts(table, source), "parts" if source == "preset" else source, context, sequence
-    )
+def _from_pieces(
+    table: body_table.Body, source: str, context: Any, sequence: str, preset: Preset | None = None
+) -> RigidBody:
+    """The body of pieces; those of a preset are scaled to another mass of the same shape."""
+    named = "preset" if preset else source
+    what = f"it follows from {named}; remove it, and say with reference what the body turns about"
+    ensure(table.center_of_mass is None, refusal("center_of_mass", what))
+    if source == "shape":
+        pieces = [_solid(table, "", context, sequence)]
+    elif source == "parts":
+        places = enumerate(table.parts or [])
+        pieces = [_solid(part, f"parts[{number}].", context, sequence) for number, part in places]
+    else:
+        zero, point = diagonal([context.zero] * 3), {"solid": "point"}
+        given = [(one.mass.at(context), vector(context, one.position)) for one in table.points or []]
+        pieces = [_Piece(mass, position, zero, point) for mass, position in given]
     total = sum((piece.mass for piece in pieces), context.zero)
-    if source == "preset" and table.mass is not None:  # of the same shape
-        mass = positive(table.mass, "mass", "mass", context)
+    if preset and table.mass is not None:
+        mass = table.mass.at(context)
         for piece in pieces:
             piece.mass *= mass / total
             piece.inertia = [[x * mass / total for x in row] for row in piece.inertia]
         total = sum((piece.mass for piece in pieces), context.zero)
     center = [sum((p.mass * p.position[i] for p in pieces), context.zero) / total for i in range(3)]
-    reference = reference_point(table, source, center, context)
+    reference = _reference_point(table, source, center, context)
     inertia = diagonal([context.zero] * 3)
     drawing = []
     for piece in pieces:
-        arm = [x - r for x, r in zip(piece.position, reference, strict=True)]
-        shifted = parallel_axis(piece.inertia, piece.mass, arm)
-        inertia = [[a + b for a, b in zip(r, s, strict=True)] for r, s in zip(inertia, shifted, strict=True)]
+        arm = minus(piece.position, reference)
+        square = dot(arm, arm)  # Steiner's theorem
+        for i, row in enumerate(inertia):
+            for j in range(3):
+                shift = piece.mass * ((square if i == j else 0) - arm[i] * arm[j])
+                row[j] = row[j] + (piece.inertia[i][j] + shift)
         drawing.append({**piece.drawing, "position": [float(plain(x)) for x in arm]})
         if piece.drawing["solid"] == "point":
             drawing[-1]["dimensions"] = {"mass_fraction": float(plain(piece.mass / total))}
-    center = [c - r for c, r in zip(center, reference, strict=True)]
-    return _finish(context, table, source, _told(table, source), total, center, inertia, drawing)
+    return _finish(context, table, named, total, minus(center, reference), inertia, drawing)
 
 
-def _with_parts(table: body_table.Body, source: str) -> body_table.Body:
-    """The table with what its preset lends it: parts, or the mass of a shape."""
-    preset = PRESETS[str(table.preset)] if table.preset is not None else None
-    if preset and source == "preset":
-        parts = [body_table.Part.model_validate(dict(part)) for part in preset.parts]
-        return table.model_copy(update={"parts": parts})
-    if preset and source == "shape" and table.mass is None and preset.mass:
-        return table.model_copy(update={"mass": parse_number(preset.mass, "kg")})
-    return table
+def _reference_point(table: body_table.Body, source: str, center: Vector, context: Any) -> Vector:
+    """Reference point in the coordinates in which the body is described."""
+    if table.reference is None or table.reference == "center_of_mass":
+        return center
+    if not isinstance(table.reference, str):
+        return vector(context, table.reference)
+    shape = SHAPES[str(table.shape)] if source == "shape" else None
+    landmarks = shape.landmarks if shape else {}
+    allowed = ", ".join(["center_of_mass", *landmarks])
+    what = f"given {shown(table.reference)}; allowed here: {allowed}, or a point [x, y, z]"
+    ensure(table.reference in landmarks, refusal("reference", what))
+    assert shape is not None
+    lengths = {key: vector(context, _lengths(table, key)) for key in shape.dimensions}
+    return landmarks[table.reference](context, lengths)
+
+
+def _lengths(table: body_table.Solid, key: str) -> list[Any]:
+    value = getattr(table, key)
+    return value if isinstance(value, list) else [value]
+
+
+def _solid(table: body_table.Solid, place: str, context: Any, sequence: str) -> _Piece:
+    """A shape, or a part, whose keys stand at a place of ``[body]``."""
+    name = str(table.shape)
+    shape = SHAPES[name]
+    _refuse_dimensions(table, tuple(shape.dimensions), f"that a {name} doesn't have", place)
+    dimensions = {}
+    for key, count in shape.dimensions.items():
+        values, where = _lengths(table, key), f"{place}{key}"
+        lengths = "a positive length" if count == 1 else f"{count} positive lengths"
+        ensure(values != [None], refusal(where, f"missing; a {name} needs it: {lengths}"))
+        ensure(len(values) == count, refusal(where, f"given {len(values)} lengths; a {name} has {count}"))
+        dimensions[key] = vector(context, values)
+    for small, large in [shape.at_most] if shape.at_most else []:
+        given, limit = (context.nstr(dimensions[key][0], 12) for key in (small, large))
+        what = f"given {given} m; at most {large} ({limit} m) is allowed"
+        ensure(dimensions[small][0] <= dimensions[large][0], refusal(f"{place}{small}", what))
+    what = "missing; this body needs a mass, a positive number"
+    ensure(table.mass is not None, refusal(f"{place}mass", what))
+    mass = table.mass.at(context)
+    inertia = diagonal([mass * m for m in shape.moments(context, dimensions)])
+    plainly = {k: [float(plain(x)) for x in v] for k, v in dimensions.items()}
+    sizes = {k: (v if shape.dimensions[k] > 1 else v[0]) for k, v in plainly.items()}
+    position = vector(context, getattr(table, "position", None))
+    drawing = _drawn(name, sizes, position)
+    turned = _attitude_of(table, sequence, place, context) if isinstance(table, body_table.Part) else None
+    if turned is not None:
+        turn = attitude.rotation_matrix(turned[0])
+        inertia = multiply(multiply(turn, inertia), transpose(turn))
+        drawing["quaternion"] = [float(plain(x)) for x in turned[0]]
+    return _Piece(mass, position, inertia, drawing)
+
+
+def _attitude_of(part: body_table.Part, sequence: str, place: str, context: Any) -> Any:
+    """Attitude of the part's own axes in the body's; None if it isn't rotated."""
+    what = "given without euler_angles; give them, or remove it"
+    alone = part.euler_sequence is not None and part.euler_angles is None
+    ensure(not alone, refusal(f"{place}euler_sequence", what))
+    fault = lambda key, text: refusal(f"{place}{key}", text)  # noqa: E731
+    return attitude.given_attitude(context, part, part.euler_sequence or sequence, fault)
+
+
+def _refuse_dimensions(table: body_table.Solid, allowed: tuple[str, ...], why: str, place: str) -> None:
+    """Raise ``ConfigError`` if a dimension is given that isn't among the allowed ones."""
+    suffix = f"; allowed: {', '.join(allowed)}" if allowed else ""
+    for key in set(DIMENSIONS) - set(allowed):
+        unknown = getattr(table, key) is not None
+        ensure(not unknown, refusal(f"{place}{key}", f"given a dimension {why}{suffix}; remove it"))
+
+
+def _drawn(solid: str, dimensions: dict[str, Any], position: Vector) -> dict[str, Any]:
+    """A solid for pictures, not rotated, as plain JSON values (see ``rigidsim.look.solids``)."""
+    place = [float(plain(x)) for x in position]
+    return {"solid": solid, "dimensions": dimensions, "position": place, "quaternion": [1.0, 0.0, 0.0, 0.0]}
 
 
 def _finish(
     context: Any,
     table: body_table.Body,
     source: str,
-    described: str,
     mass: Any,
     center: Vector,
     inertia: Matrix,
     drawing: list[dict[str, Any]],
 ) -> RigidBody:
+    """The body of a tensor, which a body can have."""
     moments, axes = eigen(context, inertia)
     if any(inertia[i][j] != 0 for i in range(3) for j in range(i)):  # axes that follow from the numbers
-        inertia, moments, axes = merged(context, inertia, moments, axes, rounding_of(table))
+        inertia, moments, axes = _merged(context, inertia, moments, axes, _rounding_of(table))
     largest = max(abs(m) for m in moments)
-    if largest == 0:
-        raise refusal(source, "all moments are zero; a body that turns needs inertia about some axis")
+    ensure(
+        largest != 0, refusal(source, "all moments are zero; a body that turns needs inertia about some axis")
+    )
     slack = largest * context.mpf(_ROUNDING_OF_INPUT)
     tiny = largest * context.mpf(2) ** (16 - context.prec)
     moments = [context.zero if abs(m) < tiny else m for m in moments]
-    listed = ", ".join(context.nstr(m, 12) for m in moments)
-    if min(moments) < 0:
-        raise refusal(source, f"principal moments {listed}: a moment of inertia can't be negative")
-    if sorted(moments)[1] == 0:
-        raise refusal(source, f"principal moments {listed}: at most one can be zero (a rod's)")
+    given = f"principal moments {', '.join(context.nstr(m, 12) for m in moments)}: "
+    ensure(min(moments) >= 0, refusal(source, f"{given}a moment of inertia can't be negative"))
+    ensure(sorted(moments)[1] != 0, refusal(source, f"{given}at most one can be zero (a rod's)"))
     small, middle, large = sorted(moments)
-    if small + middle < large - slack:
-        raise refusal(
-            source,
-            f"principal moments {listed}: the largest is more than the sum of the other two "
-            f"by {context.nstr(large - small - middle, 6)}, which no mass distribution allows "
-            "(I1 + I2 >= I3)",
-        )
-    if not drawing:
-        drawing = [_equivalent_cuboid(context, mass, center, moments, axes)]
+    what = f"{given}the largest is more than the sum of the other two by "
+    what += f"{context.nstr(large - small - middle, 6)}, which no mass distribution allows (I1 + I2 >= I3)"
+    ensure(small + middle >= large - slack, refusal(source, what))
+    drawing = drawing or [_equivalent_cuboid(context, mass, center, moments, axes)]
+    described = source
+    if table.preset is not None:  # with its reference, and what else stands in its place
+        named = f"preset {table.preset} ({PRESETS[str(table.preset)].source})"
+        scaled = f"{named}, with the mass of the config" if table.mass is not None else named
+        described = scaled if source == "preset" else f"{source} beside {named}"
     return RigidBody(mass, center, inertia, moments, axes, described, drawing)
 
 
@@ -235,18 +306,14 @@ def _equivalent_cuboid(
     context: Any, mass: Any, center: Vector, moments: Vector, axes: Matrix
 ) -> dict[str, Any]:
     """The homogeneous cuboid with these moments (of unit mass if no mass is known)."""
-    mass, center, moments = plain(mass), [plain(x) for x in center], [plain(m) for m in moments]
-    axes = [[plain(x) for x in row] for row in axes]
-    heavy = mass if mass else context.one
+    moments, heavy = [plain(m) for m in moments], plain(mass) or context.one
     total = sum(moments) / 2
     edges = [context.sqrt(max(12 * (total - m), context.zero) / heavy) for m in moments]
-    longest = max(edges)
-    visible = [float(max(edge, longest / 40)) for edge in edges]  # a plate stays visible edge on
-    drawing = drawn("cuboid", {"size": visible}, center)
-    q = attitude.quaternion_from_matrix(context, transpose(axes))
-    drawing["quaternion"] = [float(x) for x in q]
-    drawing["equivalent"] = True  # only its moments are known, not its shape
-    return drawing
+    visible = [float(max(edge, max(edges) / 40)) for edge in edges]  # a plate stays visible edge on
+    columns = transpose([[plain(x) for x in row] for row in axes])
+    q = [float(x) for x in attitude.quaternion_from_matrix(context, columns)]
+    # only its moments are known, not its shape
+    return {**_drawn("cuboid", {"size": visible}, center), "quaternion": q, "equivalent": True}
 
 
 def inverse_inertia(context: Any, body: RigidBody) -> Matrix:
@@ -255,18 +322,7 @@ def inverse_inertia(context: Any, body: RigidBody) -> Matrix:
     return multiply(multiply(transpose(body.principal_axes), diagonal(inverse)), body.principal_axes)
 
 
-def momentum(body: RigidBody, angular_velocity: Vector) -> Vector:
-    """Angular momentum about the reference point, body axes."""
-    return apply(body.inertia, angular_velocity)
-
-
-def rounding_of(table: BaseModel) -> Fraction:
-    """Relative rounding of the coarsest number of a table that looks rounded; 0 if none does."""
-    given = [x for path, found in numbers(table) for x in found if path.steps[0] != "gravity_field"]
-    return max(map(_rounding, given), default=Fraction(0))
-
-
-def merged(
+def _merged(
     context: Any, inertia: Matrix, moments: Vector, axes: Matrix, rounding: Fraction
 ) -> tuple[Matrix, Vector, Matrix]:
     """A tensor with its moments and axes (rows); moments equal to a relative ``rounding`` are made equal."""
@@ -274,8 +330,7 @@ def merged(
     low, middle, high = sorted(range(3), key=lambda i: moments[i])
     if moments[high] - moments[low] <= tiny:
         mean = sum(moments, context.zero) / 3
-        one = context.one
-        return diagonal([mean] * 3), [mean] * 3, diagonal([one] * 3)
+        return diagonal([mean] * 3), [mean] * 3, diagonal([context.one] * 3)
     lower, upper = moments[middle] - moments[low], moments[high] - moments[middle]
     if min(lower, upper) > tiny or min(lower, upper) == 0:
         return inertia, moments, axes
@@ -288,6 +343,12 @@ def merged(
         equal,
         axes,
     )
+
+
+def _rounding_of(table: BaseModel) -> Fraction:
+    """Relative rounding of the coarsest number of a table that looks rounded; 0 if none does."""
+    given = [x for path, found in numbers(table) for x in found if path.steps[0] != "gravity_field"]
+    return max(map(_rounding, given), default=Fraction(0))
 
 
 def _rounding(number: ExactNumber) -> Fraction:

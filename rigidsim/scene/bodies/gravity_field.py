@@ -6,21 +6,28 @@ The potential of the body at a distance r, in its body axes, is
 
 with unnormalized coefficients (J_n = -C_n0). Those of degree 2 are the inertia tensor's: here, degree 3 is
 the first.
+
+A file of a field is ICGEM (``.gfc``) or SHADR (``.tab`` of the Planetary Data System), told apart by its
+contents. ICGEM (Barthelmes & Foerste 2011): a header of keys and values up to ``end_of_head``, then rows
+``gfc n m C S``, metres. SHADR: one line of radius (km), G M (km^3/s^2), its error, degree, order,
+normalization (0 none, 1 full), longitude and latitude of reference, then rows ``n, m, C, S``. Numbers keep
+their digits; exponents may be written with D.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from decimal import Decimal, InvalidOperation
+from fractions import Fraction
 from typing import Any, ClassVar, Self
 
 from pydantic import Field, StrictInt, StrictStr, field_validator, model_validator
 
-from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene.bodies.field_files import FieldFileError, read_field
-from rigidsim.scene.exact import rounded
+from rigidsim.errors import ConfigError, Problem, ensure
+from rigidsim.scene.exact import parse_number, rounded
 from rigidsim.scene.fields import ConfigTable, Dimensionless, Metre, Positive, excludes, one_of, refuse
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.tracing.numbers import plain
@@ -136,9 +143,9 @@ def asked_degree(table: GravityFieldTable, loads: Iterable[Any], sweep: Any = No
 
 
 def gravity_field_of(
-    table: GravityFieldTable | None, body: Any, context: Any, texts: Mapping[str, str], degree: int
-) -> GravityField | None:
-    """The field that ``[body]`` describes; None without one.
+    table: GravityFieldTable, body: Any, context: Any, texts: Mapping[str, str], degree: int
+) -> GravityField:
+    """The field that ``[body]`` describes.
 
     Args:
         body: mass, centre of mass and inertia (``RigidBody``).
@@ -148,48 +155,43 @@ def gravity_field_of(
     Raises:
         ConfigError: it contradicts the rest of the body.
     """
-    if table is None:
-        return None
-    if body.mass is None:
-        raise fault("given, but [body] mass is missing, by which it attracts; give it")
-    if any(x != 0 for x in body.center_of_mass):
-        raise fault(
-            "given, but the body turns about another point than its centre of mass, from which the harmonics "
-            "count; remove center_of_mass or reference"
-        )
+    what = "given, but [body] mass is missing, by which it attracts; give it"
+    ensure(body.mass is not None, _fault(what))
+    what = "given, but the body turns about another point than its centre of mass, from which the harmonics "
+    what += "count; remove center_of_mass or reference"
+    ensure(all(x == 0 for x in body.center_of_mass), _fault(what))
     if table.file is not None:
         return _of_file(table.file, body, context, texts, degree)
     assert table.radius is not None
-    found = table.coefficients(context, fault)
+    found = table.coefficients(context, _fault)
     return GravityField(table.radius.at(context), found, max(n for n, _, _ in found))
 
 
 def _of_file(name: str, body: Any, context: Any, texts: Mapping[str, str], degree: int) -> GravityField:
     given = f'given "{name}", '
-    if name not in texts:
-        known = ", ".join(texts) or "none"
-        what = "but this config was given as text, without files next to it; put the file's text into "
-        raise fault(f'{given}{what}[tables."{name}"] text (there now: {known})', " file")
+    what = "but this config was given as text, without files next to it; put the file's text into [tables."
+    what += f'"{name}"] text (there now: {", ".join(texts) or "none"})'
+    ensure(name in texts, _fault(given + what, " file"))
     try:
         read = read_field(texts[name], degree)
     except FieldFileError as error:
-        raise fault(f"{given}which {_sentence(error)}", " file") from None
-
+        what = f"has in {error}" if str(error).startswith("line ") else str(error)
+        raise _fault(f"{given}which {what}", " file") from None
     radius = rounded(read.radius, context)
     mass = rounded(read.strength, context) / context.mpf(GRAVITATIONAL_CONSTANT)
-    if abs(mass - body.mass) > _SAME_MASS * body.mass:
-        there, here = (context.nstr(x, 6) for x in (mass, body.mass))
-        what = f"{given}whose G M makes the mass {there} kg, but [body] has {here} kg; "
-        raise fault(what + "is it the field of another body?", " file")
+    there, here = (context.nstr(x, 6) for x in (mass, body.mass))
+    what = (
+        f"{given}whose G M makes the mass {there} kg, but [body] has {here} kg; is it the field of another "
+    )
+    ensure(abs(mass - body.mass) <= _SAME_MASS * body.mass, _fault(what + "body?", " file"))
     found: dict[Harmonic, Any] = {}
     for (n, m), row in read.rows.items():
         factor = context.sqrt(rounded(read.squared_factor(n, m), context))
         for sine, x in zip((False, True), row, strict=True):
             found[n, m, sine] = factor * rounded(x, context)
     _refuse_other_tensor(given, found, radius, body, context)
-    refuse_impossible(found, context, lambda text: fault(text, " file"), given)
-    beyond = {key: c for key, c in found.items() if key[0] >= LEAST}
-    return GravityField(radius, beyond, degree)
+    refuse_impossible(found, context, lambda text: _fault(text, " file"), given)
+    return GravityField(radius, {key: c for key, c in found.items() if key[0] >= LEAST}, degree)
 
 
 def refuse_impossible(
@@ -209,11 +211,6 @@ def refuse_impossible(
             raise fault(what + "check radius, normalization and signs of exponents")
 
 
-def _sentence(error: FieldFileError) -> str:
-    text = str(error)
-    return f"has in {text}" if text.startswith("line ") else text
-
-
 def _refuse_other_tensor(
     given: str, found: dict[Harmonic, Any], radius: Any, body: Any, context: Any
 ) -> None:
@@ -228,14 +225,183 @@ def _refuse_other_tensor(
     }
     most = context.maximum([abs(x) for x in expected.values()])
     for (n, m, sine), value in expected.items():
-        if (n, m, sine) in found and abs(found[n, m, sine] - value) > _SAME_DEGREE_2 * most:
-            name = f"{'S' if sine else 'C'}{n}{m}"
-            there, here = (context.nstr(x, 8) for x in (found[n, m, sine], value))
-            what = f"{given}whose {name} is {there} (unnormalized), but the inertia tensor makes it {here} "
-            what += "with this mass and radius; give moments of the same body, in the same body axes"
-            raise fault(what, " file")
+        there = found.get((n, m, sine), value)
+        what = f"{given}whose {'S' if sine else 'C'}{n}{m} is {context.nstr(there, 8)} (unnormalized), but "
+        what += f"the inertia tensor makes it {context.nstr(value, 8)} with this mass and radius; give "
+        fault = _fault(what + "moments of the same body, in the same body axes", " file")
+        ensure(abs(there - value) <= _SAME_DEGREE_2 * most, fault)
 
 
-def fault(text: str, key: str = "") -> ConfigError:
-    """The error that names ``[body] gravity_field``."""
+def _fault(text: str, key: str = "") -> ConfigError:
     return ConfigError(Problem(f"{WHERE}{key}", text))
+
+
+# --- files --------------------------------------------------------------------------------------------------
+
+HEAD_ENDS = "end_of_head"
+_STRENGTH = ("earth_gravity_constant", "gravity_constant")
+_DECIDING = (*_STRENGTH, "radius", "max_degree", "norm", "product_type", "tide_system")
+_WHOLE = re.compile("[0-9]{1,6}")
+_NORMALIZED = {"fully_normalized": True, "unnormalized": False}
+_FORTRAN = str.maketrans("dD", "ee")
+_ZERO = 1e-9
+"""What a coefficient of degree 1, or C00 less 1, may be by rounding."""
+_Row = tuple[int, str, list[str]]
+
+
+class FieldFileError(ValueError):
+    """What a file lacks, or has too much of."""
+
+
+@dataclass
+class FieldFile:
+    """A field as its file has it; numbers are exact, m and m^3/s^2."""
+
+    radius: Fraction
+    strength: Fraction
+    normalized: bool
+    degree: int
+    rows: dict[tuple[int, int], tuple[Fraction, Fraction]] = field(default_factory=dict)
+
+    def squared_factor(self, n: int, m: int) -> Fraction:
+        """The square of what the file's coefficients are multiplied by, to be unnormalized."""
+        if not self.normalized:
+            return Fraction(1)
+        ratio = Fraction(math.factorial(n - m), math.factorial(n + m))
+        return (1 if m == 0 else 2) * (2 * n + 1) * ratio
+
+
+def read_field(text: str, degree: int) -> FieldFile:
+    """A field to a degree (2 at least).
+
+    Raises:
+        FieldFileError: the text is no such file, contradicts itself, or ends before that degree.
+    """
+    lines = list(enumerate(text.splitlines(), 1))
+    found, body = _icgem(lines) if HEAD_ENDS in text else _shadr(lines)
+    what = f"ends at degree {found.degree}, and degree {degree} is asked for"
+    ensure(degree <= found.degree, FieldFileError(what))
+    for number, key, words in body:
+        _add_row(found, f"line {number}: ", key, words, degree)
+    whole = found.rows.get((0, 0), (Fraction(1), Fraction(0)))[0]
+    what = f"has C of degree 0 {float(whole):.10g}; it is 1"
+    ensure(abs(whole - 1) <= _ZERO, FieldFileError(what))
+    for m in (0, 1):
+        for name, value in zip("CS", found.rows.get((1, m), ()), strict=False):
+            what = (
+                f"has {name} of degree 1, order {m} {float(value):g}: its origin isn't the centre of mass, "
+            )
+            what += "from which rotations count; take a field about the centre of mass"
+            ensure(abs(value) <= _ZERO, FieldFileError(what))
+    for n in range(3, degree + 1):
+        for m in range(n + 1):
+            what = f"has no row of degree {n}, order {m}; the file is cut short, or the text in [tables] was "
+            what += "taken for a lower degree: remove that table to read the file again"
+            ensure((n, m) in found.rows, FieldFileError(what))
+    return found
+
+
+def cut(lines: Iterable[str], degree: int) -> str:
+    """The text of a file without rows of higher degrees."""
+    kept, head = [], True
+    icgem = None
+    for line in lines:
+        words = line.replace(",", " ").split()
+        if icgem is None and words:
+            icgem = head = not _is_number(words[0])
+            kept.append(line)
+        elif head:
+            kept.append(line)
+            head = words[:1] != [HEAD_ENDS]
+        else:
+            degrees = words[1:2] if icgem else words[:1]
+            if not degrees or not _WHOLE.fullmatch(degrees[0]) or int(degrees[0]) <= degree:
+                kept.append(line)
+    return "".join(kept)
+
+
+def _icgem(lines: list[tuple[int, str]]) -> tuple[FieldFile, Iterator[_Row]]:
+    rows = [(number, line.split()) for number, line in lines]
+    end = next((i for i, (_, words) in enumerate(rows) if words[:1] == [HEAD_ENDS]), -1)
+    ensure(end >= 0, FieldFileError(f"has no line that begins with {HEAD_ENDS}"))
+    begin = next((i for i, (_, words) in enumerate(rows) if words[:1] == ["begin_of_head"]), -1)
+    head: dict[str, str] = {}
+    for _, words in rows[begin + 1 : end]:
+        key, value = (*words, "", "")[:2]
+        if value and head.setdefault(key, value) != value and key in _DECIDING:
+            raise FieldFileError(f"has the {key} {head[key]} and {value}; one is allowed")
+    product = head.get("product_type", "gravity_field")
+    what = f"is of product_type {product}; gravity_field is read"
+    ensure(product == "gravity_field", FieldFileError(what))
+    strength = next((key for key in _STRENGTH if key in head), _STRENGTH[0])
+    for key in ("radius", "max_degree", strength):
+        ensure(key in head, FieldFileError(f"has no {key} before {HEAD_ENDS}"))
+    norm, degree = head.get("norm", "fully_normalized"), head["max_degree"]  # the format's own default
+    what = f"has norm {norm}; {' and '.join(_NORMALIZED)} are read"
+    ensure(norm in _NORMALIZED, FieldFileError(what))
+    what = f"has max_degree {degree}; a whole number is expected"
+    ensure(_WHOLE.fullmatch(degree), FieldFileError(what))
+    numbers = _positive(head["radius"], "radius"), _positive(head[strength], strength)
+    found = FieldFile(*numbers, _NORMALIZED[norm], int(degree))
+    return found, ((number, words[0], words[1:]) for number, words in rows[end + 1 :] if words)
+
+
+def _shadr(lines: list[tuple[int, str]]) -> tuple[FieldFile, Iterator[_Row]]:
+    rows = [(number, [x.strip() for x in line.split(",")]) for number, line in lines if line.strip()]
+    what = f"is neither ICGEM (a header up to {HEAD_ENDS}) nor SHADR (a line of radius, G M, its error, "
+    what += "degree, order, normalization, longitude, latitude)"
+    head = rows[0][1] if rows else []
+    ensure(len(head) >= 8 and all(_is_number(x) for x in head[:6]), FieldFileError(what))
+    radius, strength, _, degree, order, normalization, longitude, latitude = head[:8]
+    what = f"has the normalization state {normalization}; 0 (none) and 1 (full) are read"
+    ensure(_number(normalization) in (0, 1), FieldFileError(what))
+    for name, given in (("longitude", longitude), ("latitude", latitude)):
+        what = f"refers to a {name} of {given} deg; fields that refer to 0 are read"
+        ensure(not given or _number(given, f"has the {name} ") == 0, FieldFileError(what))
+    what = f"has the degree {degree}; a whole number is expected"
+    ensure(_WHOLE.fullmatch(degree), FieldFileError(what))
+    what = f"goes to order {order} of degree {degree} only; whole degrees are read"
+    ensure(_number(order) >= _number(degree), FieldFileError(what))
+    size, mass = 1000 * _positive(radius, "radius"), 10**9 * _positive(strength, "G M")
+    found = FieldFile(size, mass, _number(normalization) == 1, int(degree))
+    return found, ((number, "", words) for number, words in rows[1:])
+
+
+def _add_row(found: FieldFile, where: str, key: str, words: list[str], degree: int) -> None:
+    what = "time-variable terms aren't read" if key in ("gfct", "trnd", "dot", "asin", "acos") else ""
+    what = f"{where}a row {key}; {what or 'rows gfc are expected'}"
+    ensure(key in ("", "gfc"), FieldFileError(what))
+    what = f"{where}degree, order, C and S are expected, given {' '.join(words)[:60]}"
+    whole = len(words) >= 4 and all(_WHOLE.fullmatch(x) for x in words[:2])
+    ensure(whole, FieldFileError(what))
+    n, m = int(words[0]), int(words[1])
+    if n > degree:
+        return
+    c, s = (_number(x, where) for x in words[2:4])
+    ensure(m <= n, FieldFileError(f"{where}the order {m} is above the degree {n}"))
+    ensure(m or s == 0, FieldFileError(f"{where}S of order 0 is {float(s):g}; it is zero"))
+    ensure((n, m) not in found.rows, FieldFileError(f"{where}degree {n}, order {m} comes twice"))
+    found.rows[n, m] = (c, s)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        _number(text)
+    except FieldFileError:
+        return False
+    return True
+
+
+def _number(text: str, where: str = "") -> Fraction:
+    """A decimal, perhaps with an exponent of Fortran's."""
+    try:
+        return parse_number(Decimal(text.strip().translate(_FORTRAN)), "1").rational
+    except (InvalidOperation, ValueError):
+        given = f"{text[:40]!r}" if where.startswith("has") else f"given {text[:40]!r}"
+        raise FieldFileError(f"{where}{given}; a number is expected") from None
+
+
+def _positive(text: str, what: str) -> Fraction:
+    found = _number(text, f"has the {what} ")
+    ensure(found > 0, FieldFileError(f"has the {what} {text}; a positive number is expected"))
+    return found

@@ -6,7 +6,7 @@ light and air reach each of them whatever stands before it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, Any
@@ -14,10 +14,19 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, StrictBool
 
-from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene.arithmetic import Vector, norm
+from rigidsim.errors import ConfigError, Problem, ensure
+from rigidsim.scene.arithmetic import Vector, norm, vector
 from rigidsim.scene.exact import ZERO, ExactNumber
-from rigidsim.scene.fields import ConfigTable, Dimensionless, InUnit, Metre, Triple
+from rigidsim.scene.fields import (
+    ConfigTable,
+    Dimensionless,
+    Direction,
+    InUnit,
+    Metre,
+    NotNegative,
+    Positive,
+    Triple,
+)
 from rigidsim.scene.rotations import quaternion_of
 from rigidsim.scene.tracing.numbers import plain
 
@@ -28,26 +37,37 @@ _BITS = 40  # to which shares that are written as decimals add up to 1
 _FORMS = {"plate": ("normal", "area", "both_sides"), "box": ("size",), "sphere": ("radius",)}
 
 
+def _one_form(table: Any) -> str:
+    """A rule: the keys are those of one form, and a plate has both of its own."""
+    given = [form for form, keys in _FORMS.items() if table.model_fields_set & set(keys)]
+    if len(given) != 1:
+        what = f"given the keys of a {' and a '.join(given)}" if given else "given none of its forms"
+        return f"{what}; a plate (normal, area), a box (size) or a sphere (radius) is allowed"
+    lacking = [key for key in ("normal", "area") if given == ["plate"] and getattr(table, key) is None]
+    return f"missing {lacking[0]}; a plate needs its normal and its area" if lacking else ""
+
+
 class SurfaceTable(ConfigTable):
     """A plate (``normal`` and ``area``), a box (``size``) or a sphere (``radius``) of the body's outside."""
 
-    normal: Triple[Dimensionless] | None = Field(None, examples=[[0, 0, 1]])
+    rules = (_one_form,)
+    normal: Direction | None = Field(None, examples=[[0, 0, 1]])
     """of a plate: where its front looks, body axes, of any length"""
-    area: Area | None = Field(None, examples=["0.03 m^2"])
+    area: Positive[Area] | None = Field(None, examples=["0.03 m^2"])
     """of a plate"""
     both_sides: StrictBool = False
     """of a plate: whether its back is like its front; by default it has none"""
-    size: Triple[Metre] | None = Field(None, examples=[["10 cm", "10 cm", "34 cm"]])
+    size: Triple[Positive[Metre]] | None = Field(None, examples=[["10 cm", "10 cm", "34 cm"]])
     """of a box: its edges along the body axes; six plates"""
-    radius: Metre | None = Field(None, examples=["30 cm"])
+    radius: Positive[Metre] | None = Field(None, examples=["30 cm"])
     """of a sphere"""
     position: Triple[Metre] | None = Field(None, examples=[[0, 0, "2 cm"]])
     """its centre (of pressure), in body axes from the reference point; by default the centre of mass"""
-    specular: Dimensionless = ZERO
+    specular: NotNegative[Dimensionless] = ZERO
     """share of light that is reflected as by a mirror"""
-    diffuse: Dimensionless = ZERO
+    diffuse: NotNegative[Dimensionless] = ZERO
     """share of light that is scattered by Lambert's law; the rest is absorbed"""
-    drag_coefficient: Dimensionless = _DRAG
+    drag_coefficient: NotNegative[Dimensionless] = _DRAG
     """of drag, for the area seen against the stream"""
 
 
@@ -96,39 +116,23 @@ class Ball(OuterSurface):
 def surfaces_of(
     tables: Sequence[SurfaceTable] | None, center_of_mass: Vector, context: Any
 ) -> tuple[OuterSurface, ...]:
-    """The surfaces of a body.
-
-    Raises:
-        ConfigError: a table that is none of the three, or has a number that makes no sense.
-    """
-    found: list[OuterSurface] = []
-    for number, table in enumerate(tables or []):
-        found += _of(table, f"surfaces[{number}]", center_of_mass, context)
-    return tuple(found)
+    """The surfaces of a body; ``ConfigError`` for more light than there is."""
+    places = [(table, f"surfaces[{number}]") for number, table in enumerate(tables or [])]
+    return tuple(one for table, place in places for one in _of(table, place, center_of_mass, context))
 
 
 def _of(table: SurfaceTable, place: str, center_of_mass: Vector, context: Any) -> Iterator[OuterSurface]:
-    given = [form for form, keys in _FORMS.items() if table.model_fields_set & set(keys)]
-    if len(given) != 1:
-        what = f"given the keys of a {' and a '.join(given)}" if given else "given none of its forms"
-        raise _refusal(place, f"{what}; a plate (normal, area), a box (size) or a sphere (radius) is allowed")
-    for key in _COEFFICIENTS:
-        if getattr(table, key).sign < 0:
-            raise _refusal(f"{place}.{key}", f"given {float(getattr(table, key)):g}; zero or more is allowed")
-    if table.specular.at(context) + table.diffuse.at(context) > 1 + context.ldexp(context.one, -_BITS):
-        what = (
-            f"given {float(table.specular):g} with diffuse = {float(table.diffuse):g}; shares of the light "
-        )
-        raise _refusal(f"{place}.specular", what + "add up to at most 1")
-    center = center_of_mass if table.position is None else [x.at(context) for x in table.position]
+    shares = table.specular.at(context) + table.diffuse.at(context)
+    what = f"given {float(table.specular):g} with diffuse = {float(table.diffuse):g}; shares of the light "
+    fault = ConfigError(Problem(f"[body] {place}.specular", what + "add up to at most 1"))
+    ensure(shares <= 1 + context.ldexp(context.one, -_BITS), fault)
+    center = center_of_mass if table.position is None else vector(context, table.position)
     coefficients = {key: getattr(table, key).at(context) for key in _COEFFICIENTS}
-    if given == ["sphere"]:
-        radius = _positive(table.radius, f"{place}.radius", "radius", context)
+    if table.radius is not None:
+        radius = table.radius.at(context)
         yield Ball(place, context.pi * radius * radius, center, **coefficients)
-    elif given == ["box"]:
-        assert table.size is not None
-        names = [f"{place}.size[{i}]" for i in range(3)]
-        edges = [_positive(x, name, "edge", context) for x, name in zip(table.size, names, strict=True)]
+    elif table.size is not None:
+        edges = vector(context, table.size)
         # Torques about the centre add up to none: with edges a, areas A and normals n, forces along n act
         # through it, and those along u give the sum of a A (n . u) n x u / 2, where a A is the same for all.
         for i in range(3):
@@ -136,19 +140,10 @@ def _of(table: SurfaceTable, place: str, center_of_mass: Vector, context: Any) -
             area = edges[i - 1] * edges[i - 2]
             for side in (1, -1):
                 yield Plate(place, area, center, **coefficients, normal=normal, side=side)
-    else:
-        yield from _plates(table, place, center, coefficients, context)
-
-
-def _plates(
-    table: SurfaceTable, place: str, center: Vector, coefficients: Mapping[str, Any], context: Any
-) -> Iterator[Plate]:
-    if table.normal is None or all(x.sign == 0 for x in table.normal):
-        what = "missing" if table.normal is None else "given zero"
-        raise _refusal(f"{place}.normal", f"{what}; a plate needs the direction in which its front looks")
-    area = _positive(table.area, f"{place}.area", "area", context)
-    for side in (1, -1) if table.both_sides else (1,):
-        yield Plate(place, area, center, **coefficients, normal=tuple(table.normal), side=side)
+    elif table.normal is not None and table.area is not None:
+        area = table.area.at(context)
+        for side in (1, -1) if table.both_sides else (1,):
+            yield Plate(place, area, center, **coefficients, normal=tuple(table.normal), side=side)
 
 
 def with_surfaces(
@@ -187,15 +182,3 @@ def _facing(normal: Sequence[float]) -> list[float]:
     first /= np.linalg.norm(first)
     matrix = np.stack([first, np.cross(n, first), n], axis=1)
     return [float(x) for x in quaternion_of(matrix[None])[0]]
-
-
-def _positive(number: ExactNumber | None, key: str, what: str, context: Any) -> Any:
-    if number is None:
-        raise _refusal(key, f"missing; a plate needs its {what}, a positive number")
-    if number.sign <= 0:
-        raise _refusal(key, f"given {float(number):g}; a positive {what} is allowed")
-    return number.at(context)
-
-
-def _refusal(key: str, text: str) -> ConfigError:
-    return ConfigError(Problem(f"[body] {key}", text))

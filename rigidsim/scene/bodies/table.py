@@ -52,7 +52,7 @@ _SIZES = {
 class PointMass(ConfigTable):
     """One particle of a body of particles."""
 
-    mass: Kilogram
+    mass: Positive[Kilogram]
     """mass of the particle"""
     position: Triple[Metre]
     """position in body axes"""
@@ -68,11 +68,11 @@ def _dimension(key: str, count: int) -> Any:
     taking = [name for name, shape in SHAPES.items() if key in shape.dimensions]
     told = f"{_SIZES[key]}; of {' and '.join(', '.join(taking).rsplit(', ', 1))}"
     if count == 1:
-        return Metre | None, Field(None, description=told, examples=[0.5])
+        return Positive[Metre] | None, Field(None, description=told, examples=[0.5])
     least = min(SHAPES[name].dimensions[key] for name in taking)
     sizes: dict[str, Any] = {"minItems": least, "maxItems": count}
     field = Field(None, description=told, examples=[[4, 3, 2][:count]], json_schema_extra=sizes)
-    return list[Metre] | None, field
+    return list[Positive[Metre]] | None, field
 
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ class Part(Solid):
 
     shape: Annotated[str, OneOf(SHAPES)]
     """a homogeneous solid; needs mass and dimensions"""
-    mass: Kilogram
+    mass: Positive[Kilogram]
     """mass of the part"""
     position: Triple[Metre] = Field([ZERO] * 3)
     """position of its centre of mass, in body axes"""
@@ -141,9 +141,7 @@ Reference = Annotated[
 class Core(ConfigTable):
     """A fluid core that turns by itself: symmetric about the body's axis of largest moment."""
 
-    moment: Annotated[
-        Dimensionless, Range(lambda x: 0 <= x < 1, "a part of the body's own, from 0 to below 1,")
-    ] = Field(examples=[0.0007])
+    moment: Annotated[Dimensionless, _PART] = Field(examples=[0.0007])
     """its moment about that axis, over the body's own, which includes it; at least 0 and below 1"""
     flattening: Annotated[Dimensionless, within("0", "0.5")] = Field(ZERO, examples=[3.8e-4])
     """(C_c - A_c) / C_c of its moments, from 0 to 0.5: by it the mantle's pressure turns it"""
@@ -178,7 +176,7 @@ class Body(Solid):
     """a fluid core within the body"""
     elasticity: ElasticityTable | None = Field(None, examples=[{"love_number": 0.0216, "radius": "1738 km"}])
     """tides and spin distort the tensor of inertia"""
-    mass: Kilogram | None = Field(None, examples=[12])
+    mass: Positive[Kilogram] | None = Field(None, examples=[12])
     """mass of the body; required for shapes, and wherever a load or the translational motion uses it"""
     gravity_field: GravityFieldTable | None = Field(
         None, examples=[{"radius": "1738 km", "C": {"3,0": -8.4e-6, "3,1": 2.8e-5}, "S": {"3,1": 5.9e-6}}]

@@ -17,7 +17,7 @@ from rigidsim.scene.choices import DEFAULT_METHOD, FULL, variables_named
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.paths import Path
-from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.sweep import Sweep
 from rigidsim.scene.tracing.numbers import Traced, Untraceable
 from rigidsim.solve.batch.tracing import TRACED_TABLES, Reals, Replay, TracedSystem, real_of, trace
 from rigidsim.solve.effects.effect import registered_effects
@@ -119,7 +119,7 @@ class AxisNumbers:
 
     def codes(self, place: int, which: np.ndarray) -> np.ndarray:
         """Codes below the axis's length, equal for members whose axis values have the same text."""
-        text = self.sweep.axes[place].values.text
+        text = self.sweep.axes[place].text
         known = self._words.setdefault(place, {})
         needed, index = np.unique(which, return_inverse=True)
         found = [known.setdefault(text(i), len(known)) for i in needed.tolist()]
@@ -148,7 +148,7 @@ class Members:
                 self.keys += axis.columns
                 self._traced.append((place, which))
             else:
-                self.kinds = self.kinds * axis.values.count + self._axes.codes(place, which)
+                self.kinds = self.kinds * axis.count + self._axes.codes(place, which)
 
     def experiment(self, member: int) -> Experiment:
         """A member's own experiment."""

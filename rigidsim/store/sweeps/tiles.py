@@ -21,9 +21,8 @@ import h5py
 import numpy as np
 
 from rigidsim.errors import RESUME, RunFolderError
+from rigidsim.scene.sweep import Axis, Sweep
 from rigidsim.scene.sweep_table import RANDOM, AxisTable
-from rigidsim.scene.sweeps.axes import Axis
-from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.scene.toml_text import apply_overrides, parse_toml
 from rigidsim.store import atomic
 from rigidsim.store.atomic import sink
@@ -66,11 +65,11 @@ def keys_of(sweep: Sweep) -> np.ndarray:
 
 
 def _numbers(axis: Axis, table: AxisTable, seed: int) -> np.ndarray:
-    count = axis.values.count
+    count = axis.count
     if table.way in RANDOM:  # values that take long to draw, and that seed, key and index decide
         drawn = repr((axis.key, table.way, getattr(table, table.way), table.grid, seed))
         return np.random.Philox(key=int(_hash(drawn)) % 2**64).random_raw(count).view(np.int64)
-    return np.array([_hash(f"{axis.key}={axis.values.text(i)}") for i in range(count)])
+    return np.array([_hash(f"{axis.key}={axis.text(i)}") for i in range(count)])
 
 
 def _hash(text: str) -> np.int64:
@@ -375,7 +374,7 @@ def _coordinates(file: NetcdfFile, sweep: Sweep) -> str:
         dim = axis.name if sweep.product else sweep.dims[0]
         described: dict[str, Any] = {"long_name": axis.key, "units": axis.unit, "swept_key": axis.key}
         if not axis.numeric:
-            texts = [_bare(axis.values.text(i)) for i in range(axis.values.count)]
+            texts = [_bare(axis.text(i)) for i in range(axis.count)]
             del described["units"]
             file.texts(axis.name, dim, texts, described)
             beside += [] if dim == axis.name else [axis.name]
@@ -383,9 +382,9 @@ def _coordinates(file: NetcdfFile, sweep: Sweep) -> str:
         numbers = label_numbers(axis)
         name = axis.name
         dims: tuple[str, ...] = (dim,)
-        if axis.values.components:
+        if axis.components:
             name = f"{axis.name}_value" if sweep.product else axis.name
-            file.dimension(f"{axis.name}_component", axis.values.components)
+            file.dimension(f"{axis.name}_component", axis.components)
             dims = (dim, f"{axis.name}_component")
         if dims != (name,):
             beside.append(name)
@@ -395,8 +394,8 @@ def _coordinates(file: NetcdfFile, sweep: Sweep) -> str:
 
 def label_numbers(axis: Axis) -> np.ndarray:
     """The values of an axis as doubles, (count,) or (count, components); their texts are exact."""
-    found = np.array([[float(x) for x in axis.exact(i)] for i in range(axis.values.count)])
-    return found if axis.values.components else found[:, 0]
+    found = np.array([[float(x) for x in axis.exact(i)] for i in range(axis.count)])
+    return found if axis.components else found[:, 0]
 
 
 def _bare(text: str) -> str:

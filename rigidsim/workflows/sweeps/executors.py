@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from rigidsim.errors import RigidsimError, StoppedError, Wording
-from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.sweep import Sweep
 from rigidsim.solve.compiled import quieten_engine
 from rigidsim.store import atomic, provenance
 from rigidsim.store.sweeps.tiles import Tile, plain

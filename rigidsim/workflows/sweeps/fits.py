@@ -15,7 +15,7 @@ import numpy as np
 
 from rigidsim.errors import FORCE, SWEEP, ConfigError, RigidsimError, RunFolderError
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.sweeps.sweep import FITS, Sweep
+from rigidsim.scene.sweep import FITS, Sweep
 from rigidsim.solve.status import Status
 from rigidsim.store import atomic
 from rigidsim.store.sweeps.folder import FittedOfMembers

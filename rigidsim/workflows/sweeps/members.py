@@ -22,8 +22,8 @@ from rigidsim.scene.cautions import WarningCode
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.parts_of_values import part_name
 from rigidsim.scene.scene import build_scene
+from rigidsim.scene.sweep import FITS, Sweep
 from rigidsim.scene.sweep_table import INDICATORS
-from rigidsim.scene.sweeps.sweep import FITS, Sweep
 from rigidsim.session.dataset import dataset_variables, kernel_attributes
 from rigidsim.solve.batch.family import (
     AxisNumbers,
@@ -548,7 +548,7 @@ class BatchTiles:
         sweep = self._sweep
         apart = [place for place in range(len(sweep.axes)) if not self.axes.traced(place)]
         if sweep.product or not apart:
-            return math.prod(sweep.axes[place].values.count for place in apart), sweep.count
+            return math.prod(sweep.axes[place].count for place in apart), sweep.count
         some = np.arange(0, sweep.count, -(-sweep.count // _COUNTED))
         codes = np.stack([self.axes.codes(place, some) for place in apart])
         return len(np.unique(codes, axis=1).T), len(some)
@@ -745,7 +745,7 @@ def first_possible(sweep: Sweep) -> int:
         try:
             prepare(sweep.worked_out(member))
         except ConfigError as error:
-            refused = refused or sweep.blamed(member, error)
+            refused = refused or sweep.with_member_named(member, error)
         else:
             return member
     assert refused is not None

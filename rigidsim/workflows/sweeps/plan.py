@@ -9,7 +9,7 @@ from rigidsim.errors import ConfigError, Problem, Remedy
 from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import build_scene
-from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.sweep import Sweep
 from rigidsim.session.dataset import dataset_variables, refuse_taken_names
 from rigidsim.solve.lanes import recommended_width
 from rigidsim.solve.problem import InitialValueProblem, prepare
@@ -76,7 +76,7 @@ def check_sweep(sweep: Sweep, *, every: bool = True, each: Each = map) -> Initia
             problems = _worked_out(sweep, _OF_AN_AXIS)
         if refused and not problems:
             errors, _ = batches_of(sweep.experiment.text, sweep.experiment.source).refused(refused)
-            told = [sweep.blamed(member, errors[member]) for member in refused if member in errors]
+            told = [sweep.with_member_named(member, errors[member]) for member in refused if member in errors]
             problems = [problem for error in told for problem in error.problems]
         if not problems and accepted < sweep.count <= _ALL and every and not sweep.fits:
             problems = _worked_out(sweep, _FEWER, equations=True)
@@ -100,7 +100,7 @@ def _worked_out(sweep: Sweep, most: int, *, equations: bool = False) -> list[Pro
             else:
                 check_start(build_scene(experiment))
         except ConfigError as error:
-            problems += sweep.blamed(member, error).problems
+            problems += sweep.with_member_named(member, error).problems
             if len(problems) >= _MOST_TOLD:
                 break
     return problems
@@ -298,9 +298,9 @@ def plan_sweep(sweep: Sweep, *, out: str | Path = "runs") -> SweepPlan:
             name=axis.name,
             key=axis.key,
             unit=axis.unit if axis.numeric else None,
-            count=axis.values.count,
-            first=axis.values.text(0),
-            last=axis.values.text(axis.values.count - 1),
+            count=axis.count,
+            first=axis.text(0),
+            last=axis.text(axis.count - 1),
         )
         for axis in sweep.axes
     ]

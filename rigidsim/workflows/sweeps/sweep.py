@@ -13,7 +13,7 @@ import numpy as np
 
 from rigidsim.errors import FORCE, OUT, ConfigError, Problem, RunFolderError
 from rigidsim.scene.scene import build_scene
-from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.sweep import Sweep
 from rigidsim.scene.validation_messages import shown
 from rigidsim.session.dataset import kernel_attributes
 from rigidsim.store import atomic

@@ -9,7 +9,7 @@ import numpy as np
 import xarray
 
 from rigidsim.errors import RESUME, ConfigError, Problem, RunFolderError
-from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.sweep import Sweep
 from rigidsim.store import provenance
 from rigidsim.store.sweeps.folder import SavedSweep, open_sweep
 from rigidsim.store.sweeps.tiles import Kept

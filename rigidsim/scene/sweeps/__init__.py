@@ -1,1 +1,0 @@
-"""Members of a ``[sweep]``, each with exact values."""
