@@ -11,11 +11,11 @@ from rigidsim.scene.starts import (
     ATTITUDES,
     InitialRotation,
     StartForm,
-    beyond,
+    angle_out_of_range,
+    attitude_from_pole,
     from_equator,
     meridian,
     register_start,
-    upright,
 )
 
 
@@ -26,18 +26,18 @@ def _from_obliquity(scene: Scene) -> InitialRotation:
     assert table.node_longitude is not None
     tilt, node = table.obliquity.at(context), table.node_longitude.at(context)
     if not 0 <= tilt <= context.pi * (1 + negligible(context)):
-        raise beyond("obliquity", "", context, tilt, "0 to 180 deg")
+        raise angle_out_of_range("obliquity", "", context, tilt, "0 to 180 deg")
     normal = initial_normal(scene, loads_of(scene))
     length = norm(context, normal)
     columns = transpose(plane_axes(context, [x / length for x in normal]))
     to_space = attitude.quaternion_from_matrix(context, columns)
-    quaternion = attitude.product(to_space, upright(scene, node, tilt, context.zero))
+    quaternion = attitude.product(to_space, attitude_from_pole(scene, node, tilt, context.zero))
     if table.prime_meridian is not None:
         w, x, y, z = equator = from_equator(scene, "prime_meridian")
         inside = attitude.rotation_matrix(attitude.product([w, -x, -y, -z], quaternion))
         east, north, up = apply(inside, scene.figure.pole)
         node, tilt = context.atan2(east, -north), context.atan2(context.hypot(east, north), up)
-        quaternion = attitude.product(equator, upright(scene, node, tilt, meridian(scene)))
+        quaternion = attitude.product(equator, attitude_from_pole(scene, node, tilt, meridian(scene)))
     return InitialRotation(attitude.unit_quaternion(context, quaternion))
 
 

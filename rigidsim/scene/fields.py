@@ -25,6 +25,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError, core_schema
 
+from rigidsim.errors import ensure
 from rigidsim.scene.epochs import Epoch, parse_epoch
 from rigidsim.scene.exact import ExactNumber, for_doubles, parse_number
 from rigidsim.scene.two_line_elements import TwoLineElements, parse_elements
@@ -231,10 +232,13 @@ def within(least: str, most: str) -> Range:
     return Range(lambda x: Fraction(least) <= x <= Fraction(most), f"{least} to {most}")
 
 
-def _directed(value: list[ExactNumber]) -> list[ExactNumber]:
-    if all(x.sign == 0 for x in value):
-        raise refuse("given [0, 0, 0]; a direction is needed")
+def _not_zero(value: list[ExactNumber]) -> list[ExactNumber]:
+    ensure(any(x.sign for x in value), refuse("given zero; a direction is needed, of any length but zero"))
     return value
+
+
+NotZero = AfterValidator(_not_zero)
+"""Annotation of a vector with any norm but zero."""
 
 
 Dimensionless = Annotated[ExactNumber, InUnit("1")]
@@ -306,7 +310,7 @@ class Exactly:
 Pair = Annotated[list[T], Field(min_length=2, max_length=2), Exactly(2)]
 Triple = Annotated[list[T], Field(min_length=3, max_length=3), Exactly(3)]
 """A vector of three components."""
-Direction = Annotated[Triple[Dimensionless], AfterValidator(_directed)]
+Direction = Annotated[Triple[Dimensionless], NotZero]
 """A vector that isn't zero, of any length."""
 Four = Annotated[list[T], Field(min_length=4, max_length=4), Exactly(4)]
 """A quaternion's four components."""

@@ -147,7 +147,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             return None
 
     body = attempt(_body_at_start, config, context)
-    attempt(starts.check_ways, config.initial, context)
+    attempt(starts.check_ways, config.initial)
     times = attempt(sample_times, config.time, context, config.texts)
     if body is None or times is None or problems:
         raise ConfigError(problems, source)

@@ -41,6 +41,7 @@ from rigidsim.scene.fields import (
     Irradiance,
     Metre,
     Momentum,
+    NotZero,
     OneOf,
     Pair,
     Positive,
@@ -50,6 +51,7 @@ from rigidsim.scene.fields import (
     Speed,
     Triple,
     VariableName,
+    excludes,
     named,
     refuse,
 )
@@ -72,16 +74,20 @@ _ABOUT_LOADS = "loads that act on the body, each of a kind; without any the body
 EQUILIBRIUM_NAMES = ("relative", "cassini_1", "cassini_2", "cassini_3", "cassini_4")
 
 
+_NOT_ZERO = Range(lambda x: x != 0, "any other time, a negative one for retrograde,")
+
+
 class Initial(ConfigTable):
     """``[initial]``: the state at ``time.start``."""
 
+    rules = (excludes("tle", "position", "velocity", "frame"),)
     angular_velocity: Triple[Rate] | None = Field(
         None, examples=[[0.1, 1.0, 0.05], ["0 deg/s", "0 deg/s", "20 deg/h"]]
     )
     """angular velocity relative to space, in body axes; this or angular_momentum"""
     angular_momentum: Triple[Momentum] | None = Field(None, examples=[[0, 0, 12.5]])
     """angular momentum in space axes, instead of angular_velocity"""
-    quaternion: Four[Dimensionless] | None = Field(None, examples=[[1, 0, 0, 0]])
+    quaternion: Annotated[Four[Dimensionless], NotZero] | None = Field(None, examples=[[1, 0, 0, 0]])
     """attitude w, x, y, z: takes body axes to space axes; any norm but zero; by default the body axes start
     along the space axes
     """
@@ -103,7 +109,7 @@ class Initial(ConfigTable):
     """longitude of the node where the body's equator rises through the plane of [frame] reference; without
     prime_meridian the figure's prime meridian starts there
     """
-    spin_period: Second | None = Field(None, examples=["25 h"])
+    spin_period: Annotated[Second, _NOT_ZERO] | None = Field(None, examples=["25 h"])
     """time of a turn about the figure axis, instead of angular_velocity; negative: the other way round"""
     equilibrium: Annotated[str, OneOf(EQUILIBRIUM_NAMES)] | None = None
     """start in an equilibrium, which is found: relative (at rest in the frame of a circular orbit; the stable

@@ -17,9 +17,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.scene import attitude, space_axes
-from rigidsim.scene.arithmetic import Vector, apply, dot, negligible, transpose
+from rigidsim.scene.arithmetic import Vector, apply, dot, minus, negligible, transpose, vector
 from rigidsim.scene.bodies.body import RigidBody, inverse_inertia
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.registry import Setting
@@ -53,19 +53,12 @@ class StartForm:
             ``ConfigError``.
         needed: keys that must stand beside it.
         allowed: keys that may stand beside it.
-        check: refuses numbers that are wrong whatever the scene, in the arithmetic of a context.
     """
 
     key: str
     resolve: Callable[[Any], Any]
     needed: tuple[str, ...] = ()
     allowed: tuple[str, ...] = ()
-    check: Callable[[Initial, Any], None] = lambda table, context: None
-
-    @property
-    def described(self) -> str:
-        """Its keys, for messages."""
-        return " with ".join((self.key, *self.needed))
 
 
 ATTITUDES: dict[str, StartForm] = {}
@@ -78,8 +71,7 @@ _BESIDE = ("prime_meridian", "node_longitude")  # which give nothing alone
 def register_start(ways: dict[str, StartForm], way: StartForm, name: str = "") -> None:
     """Register a way in ``ATTITUDES``, ``RATES`` or ``EQUILIBRIA``; ``ValueError`` if the name is taken."""
     known = ways.setdefault(name or way.key, way)
-    if known.resolve is not way.resolve:
-        raise ValueError(f"a start by {name or way.key} is registered already")
+    ensure(known.resolve is way.resolve, ValueError(f"a start by {name or way.key} is registered already"))
 
 
 def refusal(key: str, text: str) -> ConfigError:
@@ -87,54 +79,38 @@ def refusal(key: str, text: str) -> ConfigError:
     return ConfigError(Problem(f"[initial] {key}", text))
 
 
-def beyond(key: str, what: str, context: Any, angle: Any, allowed: str) -> ConfigError:
-    """The error for an angle (rad) beyond its range."""
+def angle_out_of_range(key: str, what: str, context: Any, angle: Any, allowed: str) -> ConfigError:
+    """The error for an angle (rad) out of its range."""
     degrees = f"{what}{context.nstr(context.degrees(angle), 8)} deg"
     return refusal(key, f'given {degrees}; {allowed} is allowed, and degrees have their unit: "23.44 deg"')
 
 
-def check_ways(table: Initial, context: Any) -> None:
+def check_ways(table: Initial) -> None:
     """Refuse what contradicts itself before anything is worked out."""
-    attitude_way, rates_way = (
-        _chosen(table, ATTITUDES, "attitude"),
-        _chosen(table, RATES, "start of the rates"),
-    )
-    equilibrium = None
-    if table.equilibrium is not None:
-        equilibrium = EQUILIBRIA[table.equilibrium]
-        for way in (attitude_way, rates_way):
-            if way is not None and way.key not in equilibrium.allowed:
-                what = f'given with equilibrium = "{table.equilibrium}", which finds it; remove one of them'
-                raise refusal(way.key, what)
-    elif rates_way is None:
-        raise refusal(
-            "angular_velocity", f"missing; exactly one of {_either(RATES)} and equilibrium is needed"
-        )
-    beside = {key for way in (attitude_way, equilibrium) if way for key in (*way.needed, *way.allowed)}
+    ways = [_chosen(table, ATTITUDES, "attitude"), _chosen(table, RATES, "start of the rates")]
+    equilibrium = EQUILIBRIA[table.equilibrium] if table.equilibrium is not None else None
+    for way in filter(None, ways if equilibrium else ()):
+        what = f'given with equilibrium = "{table.equilibrium}", which finds it; remove one of them'
+        ensure(equilibrium and way.key in equilibrium.allowed, refusal(way.key, what))
+    either = ", ".join(" with ".join((way.key, *way.needed)) for way in RATES.values())
+    what = f"missing; exactly one of {either} and equilibrium is needed"
+    ensure(equilibrium or ways[1], refusal("angular_velocity", what))
+    beside = {key for way in (ways[0], equilibrium) if way for key in (*way.needed, *way.allowed)}
     for key in _BESIDE:
-        if getattr(table, key) is not None and key not in beside:
-            takers = [way.key for way in ATTITUDES.values() if key in (*way.needed, *way.allowed)]
-            raise refusal(key, f"given without {' or '.join(takers)}, with which it counts; add that")
-    for way in (attitude_way, rates_way):
-        if way is not None:
-            way.check(table, context)
+        takers = [way.key for way in ATTITUDES.values() if key in (*way.needed, *way.allowed)]
+        what = f"given without {' or '.join(takers)}, with which it counts; add that"
+        ensure(getattr(table, key) is None or key in beside, refusal(key, what))
 
 
 def _chosen(table: Initial, ways: dict[str, StartForm], what: str) -> StartForm | None:
     """The way whose keys are given; None without any."""
     given = [way for way in ways.values() if getattr(table, way.key) is not None]
-    if len(given) > 1:
+    for other in given[1:]:
         text = f"given with {given[0].key}; only one {what} is allowed: remove one of them"
-        raise refusal(given[1].key, text)
-    for way in given:
-        for key in way.needed:
-            if getattr(table, key) is None:
-                raise refusal(key, f"missing; {way.key} needs it")
+        raise refusal(other.key, text)
+    for key in given[0].needed if given else ():
+        ensure(getattr(table, key) is not None, refusal(key, f"missing; {given[0].key} needs it"))
     return given[0] if given else None
-
-
-def _either(ways: dict[str, StartForm]) -> str:
-    return ", ".join(way.described for way in ways.values())
 
 
 def attitude_of(scene: Setting) -> InitialRotation:
@@ -152,13 +128,12 @@ def rotation_of(scene: Any) -> InitialRotation:
         rates = _chosen(table, RATES, "")
         assert rates is not None
         key, start = rates.key, InitialRotation(scene.quaternion, rates.resolve(scene), scene.euler_angles)
-    if along_massless(scene.body, start.angular_velocity):
-        what = "has a spin about the axis that has no moment of inertia, where a spin means nothing; "
-        raise refusal(key, what + "make that component zero")
+    what = "has a spin about the axis that has no moment of inertia, where a spin means nothing; make that "
+    ensure(not _along_massless(scene.body, start.angular_velocity), refusal(key, what + "component zero"))
     return start
 
 
-def along_massless(body: RigidBody, vector: Vector) -> bool:
+def _along_massless(body: RigidBody, vector: Vector) -> bool:
     """Whether a vector has a part along an axis without inertia (a rod's)."""
     axes = zip(body.principal_moments, body.principal_axes, strict=True)
     return any(
@@ -176,11 +151,7 @@ def _as_written(scene: Setting) -> InitialRotation:
     return InitialRotation(given[0], euler_angles=given[1])
 
 
-def _check_written(table: Initial, context: Any) -> None:
-    attitude.given_attitude(context, table, "zxz", refusal)
-
-
-def upright(scene: Setting, node: Any, tilt: Any, turn: Any) -> Vector:
+def attitude_from_pole(scene: Setting, node: Any, tilt: Any, turn: Any) -> Vector:
     """Quaternion of R3(node) R1(tilt) R3(turn) F^T, body axes to those of the plane (radians)."""
     context, figure = scene.context, scene.figure
     turned = attitude.quaternion_from_euler(context, [node, tilt, turn], "zxz")
@@ -193,11 +164,10 @@ def from_equator(scene: Setting, key: str) -> Vector:
     """Quaternion that takes axes of the equator and equinox of J2000 to the scene's space axes; refused,
     naming a key, where these are unknown.
     """
-    context = scene.context
-    if scene.axes is None:
-        what = "counts from the equator of J2000, but what the space axes are isn't known; set [frame] axes "
-        raise refusal(key, f'{what}to "EME2000" or "ecliptic J2000", or give the attitude otherwise')
-    return space_axes.from_equator(scene.axes, context)
+    what = "counts from the equator of J2000, but what the space axes are isn't known; set [frame] axes to "
+    what += '"EME2000" or "ecliptic J2000", or give the attitude otherwise'
+    ensure(scene.axes is not None, refusal(key, what))
+    return space_axes.from_equator(scene.axes, scene.context)
 
 
 def _from_pole(scene: Setting) -> InitialRotation:
@@ -206,10 +176,9 @@ def _from_pole(scene: Setting) -> InitialRotation:
     to_space = from_equator(scene, "pole")
     ascension, declination = (x.at(context) for x in table.pole)
     quarter = context.pi / 2
-    if abs(declination) > quarter * (1 + negligible(context)):
-        raise beyond("pole", "a declination of ", context, declination, "-90 to 90 deg")
-    turn = meridian(scene)
-    plain = upright(scene, ascension + quarter, quarter - declination, turn)
+    fault = angle_out_of_range("pole", "a declination of ", context, declination, "-90 to 90 deg")
+    ensure(abs(declination) <= quarter * (1 + negligible(context)), fault)
+    plain = attitude_from_pole(scene, ascension + quarter, quarter - declination, meridian(scene))
     return InitialRotation(attitude.product(to_space, plain))
 
 
@@ -223,45 +192,27 @@ def meridian(scene: Setting) -> Any:
 
 
 def _given_rates(scene: Setting) -> Vector:
-    table = scene.config.initial
-    assert table.angular_velocity is not None
-    return [x.at(scene.context) for x in table.angular_velocity]
+    return vector(scene.context, scene.config.initial.angular_velocity)
 
 
 def _from_momentum(scene: Any) -> Vector:
-    table = scene.config.initial
-    assert table.angular_momentum is not None
     to_body = transpose(attitude.rotation_matrix(scene.quaternion))
-    momentum = apply(to_body, [x.at(scene.context) for x in table.angular_momentum])
-    if along_massless(scene.body, momentum):
-        what = "has a part along the axis that has no moment of inertia; make that part zero"
-        raise refusal("angular_momentum", what)
+    momentum = apply(to_body, vector(scene.context, scene.config.initial.angular_momentum))
+    what = "has a part along the axis that has no moment of inertia; make that part zero"
+    ensure(not _along_massless(scene.body, momentum), refusal("angular_momentum", what))
     for load in scene.loads:
         if load.inner_momentum is not None:
-            momentum = [x - h for x, h in zip(momentum, load.inner_momentum, strict=True)]
+            momentum = minus(momentum, load.inner_momentum)
     return apply(inverse_inertia(scene.context, scene.body), momentum)
 
 
 def spin_rate(scene: Setting) -> Any:
     """Rate (mpf, rad/s) about the figure axis that ``spin_period`` means."""
-    period = scene.config.initial.spin_period
-    assert period is not None
-    return 2 * scene.context.pi / period.at(scene.context)
-
-
-def _check_period(table: Initial, context: Any) -> None:
-    assert table.spin_period is not None
-    if table.spin_period.at(context) == 0:
-        raise refusal("spin_period", "given 0 s; any other time is allowed, a negative one for retrograde")
-
-
-def _from_period(scene: Setting) -> Vector:
-    rate = spin_rate(scene)
-    return [rate * x for x in scene.figure.pole]
+    return 2 * scene.context.pi / scene.config.initial.spin_period.at(scene.context)
 
 
 for _way in (
-    StartForm("quaternion", _as_written, check=_check_written),
+    StartForm("quaternion", _as_written),
     StartForm("euler_angles", _as_written),
     StartForm("pole", _from_pole, allowed=("prime_meridian",)),
 ):
@@ -269,6 +220,6 @@ for _way in (
 for _way in (
     StartForm("angular_velocity", _given_rates),
     StartForm("angular_momentum", _from_momentum),
-    StartForm("spin_period", _from_period, check=_check_period),
+    StartForm("spin_period", lambda scene: [spin_rate(scene) * x for x in scene.figure.pole]),
 ):
     register_start(RATES, _way)

@@ -241,10 +241,10 @@ def test_refused_with_a_message_that_helps(
         (
             {
                 "body": "principal_moments = [1, 2, 4]",
-                "initial": "angular_velocity = [1, 0, 0]\nquaternion = [0, 0, 0, 0]",
+                "initial": "angular_velocity = [1, 0, 0]\nprime_meridian = 1",
                 "time": "end = 0",
             },
-            ["[body] principal_moments", "[initial] quaternion", "[time] end"],
+            ["[body] principal_moments", "[initial] prime_meridian", "[time] end"],
         ),
     ],
     ids=["text", "mechanics"],
