@@ -138,7 +138,7 @@ def test_start_and_observables_agree_to_the_last_digits(precision: str, axis: st
         ("obliquity = 1", "", "node_longitude", "missing; obliquity needs it"),
         ("node_longitude = 1", "", "node_longitude", "given without obliquity"),
         ('obliquity = "-1 deg"\nnode_longitude = 1', "", "obliquity", "given -1.0 deg; 0 to 180 deg"),
-        ("spin_period = 0", "", "spin_period", "given 0 s"),
+        ("spin_period = 0", "", "spin_period", "given 0; any other time"),
         ("spin_period = 1\nangular_velocity = [1, 0, 0]", "", "spin_period", "given with angular_velocity"),
     ],
 )
