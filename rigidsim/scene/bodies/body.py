@@ -211,7 +211,7 @@ def _lengths(table: body_table.Solid, key: str) -> list[Any]:
     return value if isinstance(value, list) else [value]
 
 
-def _solid(table: body_table.Solid, place: str, context: Any, sequence: str) -> _Piece:
+def _solid(table: body_table.Body | body_table.Part, place: str, context: Any, sequence: str) -> _Piece:
     """A shape, or a part, whose keys stand at a place of ``[body]``."""
     name = str(table.shape)
     shape = SHAPES[name]
