@@ -227,8 +227,8 @@ def _solid(table: body_table.Body | body_table.Part, place: str, context: Any, s
         given, limit = (context.nstr(dimensions[key][0], 12) for key in (small, large))
         what = f"given {given} m; at most {large} ({limit} m) is allowed"
         ensure(dimensions[small][0] <= dimensions[large][0], refusal(f"{place}{small}", what))
-    what = "missing; this body needs a mass, a positive number"
-    ensure(table.mass is not None, refusal(f"{place}mass", what))
+    if table.mass is None:
+        raise refusal(f"{place}mass", "missing; this body needs a mass, a positive number")
     mass = table.mass.at(context)
     inertia = diagonal([mass * m for m in shape.moments(context, dimensions)])
     plainly = {k: [float(plain(x)) for x in v] for k, v in dimensions.items()}
