@@ -35,12 +35,12 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.fixed_axes import keeps, parallel
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.orbit_planes import OrbitPlane, flight_plane, kepler_plane, table_plane
+from rigidsim.model.probing import keeps
 from rigidsim.model.rotations import Symbolic, along, apply, transpose, unit
-from rigidsim.scene.arithmetic import Matrix, Vector, cross, norm
+from rigidsim.scene.arithmetic import Matrix, Vector, cross, norm, parallel
 from rigidsim.scene.frame import ORBIT
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene

@@ -8,7 +8,7 @@ from typing import Any
 
 import heyoka as hy
 
-import rigidsim.model.partial_invariants  # noqa: F401  (enters what it defines into the registry)
+import rigidsim.model.invariants  # noqa: F401  (enters what it defines into the registry)
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.euler_poles import Poles
 from rigidsim.model.mechanics import Mechanics

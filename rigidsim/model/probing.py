@@ -24,7 +24,17 @@ from rigidsim.model.orbits.prescribed import OrbitStates
 from rigidsim.model.scaling import choose_scaling, scaled_numbers
 from rigidsim.model.state_blocks import AttitudeStates, StateBlock
 from rigidsim.scene import attitude
-from rigidsim.scene.arithmetic import Matrix, Vector, apply, cross, dot, negligible, norm, parallel
+from rigidsim.scene.arithmetic import (
+    Matrix,
+    Vector,
+    apply,
+    cross,
+    dot,
+    negligible,
+    norm,
+    parallel,
+    unit_vectors,
+)
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.tracing.numbers import Traced, plain
@@ -215,3 +225,54 @@ def spared_axis(m: Mechanics, found: Sequence[Sequence[Acting | None]]) -> Vecto
     axis = [x / size if abs(x) > tiny * size else context.zero for x in axis]
     axis = [x / norm(context, axis) for x in axis]
     return axis if spared(m, found, axis) else None
+
+
+# --- axes about which nothing acts -------------------------------------------------------------------------
+
+
+def keeps(m: Mechanics, axis: Vector, loads: Sequence[Load] | None = None) -> bool:
+    """Whether no torque of these loads (or any) acts about a unit axis in space, however the body moves."""
+    which = [i for i, load in enumerate(m.loads) if load in m.turning and (loads is None or load in loads)]
+    return not which or spared(m, [[sample[i] for i in which] for sample in samples(m)], axis)
+
+
+def kept_axes(m: Mechanics) -> dict[str, Vector]:
+    """Unit axes in space without a torque about them, where some torque acts, by what momenta along them are
+    called: the only one by sources at rest, or by a field; x, y and z by nothing else. The vertical is apart.
+    """
+    if "kept axes" in m.made:
+        return m.made["kept axes"]
+    found: dict[str, Vector] = {}
+    context, up = m.scene.context, m.numbers.up if m.numbers.arm is not None else None
+    marks = [mark for load in m.turning if (mark := load.direction(m.scene)) is not None]
+    axis = spared_axis(m, samples(m)) if m.torque else None
+    if axis is not None and not (up is not None and parallel(context, up, axis)):
+        along = next((x for mark in marks if abs(x := dot(mark, axis)) > negligible(context)), context.one)
+        axis = axis if along > 0 else [-x for x in axis]
+        in_field = any(parallel(context, mark, axis) for mark in marks)
+        if any(load.fixed_source(m.scene) is not None for load in m.turning):
+            found["source"] = axis
+        elif in_field or all(abs(x) != 1 for x in axis):
+            found["field"] = axis
+    named = [*found.values(), *([] if up is None else [up])]
+    for name, axis in zip("xyz", unit_vectors(context) if m.torque else [], strict=False):
+        if not any(parallel(context, axis, other) for other in named) and keeps(m, axis):
+            found[name] = axis
+    m.made["kept axes"] = found
+    return found
+
+
+def _points(m: Mechanics) -> list[Vector]:
+    return [point for load in m.loads if (point := load.attracting_point) is not None]
+
+
+def one_point(m: Mechanics) -> bool:
+    """Whether nothing turns the motion, spin and orbit together, about an attracting point."""
+    points, context = _points(m), m.scene.context
+    return bool(points) and all(spared(m, samples(m, points[0]), axis) for axis in unit_vectors(context))
+
+
+def attracting_line(m: Mechanics) -> Vector | None:
+    """Unit vector of the one line through an attracting point about which nothing turns the motion."""
+    points = _points(m)
+    return spared_axis(m, samples(m, points[0])) if points else None

@@ -14,8 +14,8 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.invariants import WATCHED
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.partial_invariants import BUILT_IN
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
 
@@ -34,10 +34,10 @@ _FOLLOWS = {
     "angular_momentum_norm": ("angular_momentum", "its three components are projected"),
     "energy": ("rotational_energy", "its rotational part is projected; nothing turns the flight's velocity"),
 }
-_WATCHED = "it is watched alone: what is projected is a set that keeps the numbers of earlier runs"
+_ALONE = "it is watched alone: what is projected is a set that keeps the numbers of earlier runs"
 _NEVER = {
     "energy_balance": "it checks a work that is integrated with the motion and doesn't act on it",
-    **{observable.name: _WATCHED for observable in BUILT_IN},
+    **{observable.name: _ALONE for observable in WATCHED},
 }
 
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model import first_integrals, fixed_axes
 from rigidsim.model.euler_poles import Poles, angles_of_matrix, squared_factor
 from rigidsim.model.frames import jacobi_constant
 from rigidsim.model.loads.attraction import Attraction
@@ -21,6 +20,7 @@ from rigidsim.model.observables.observable import (
     register_all,
     same_unit,
 )
+from rigidsim.model.probing import keeps, one_point
 from rigidsim.model.rotations import Symbolic, along
 from rigidsim.model.scaling import loads_amplitude, potential_amplitude, source_rate
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, norm
@@ -147,7 +147,7 @@ def _rotation_alone(m: Mechanics) -> str | None:
 
 
 def _vertical_only(m: Mechanics) -> str | None:
-    if not fixed_axes.keeps(m, m.carried(m.numbers.up)):
+    if not keeps(m, m.carried(m.numbers.up)):
         return None
     alone = len(m.turning) == 1
     return f"{'gravity has' if alone else 'the loads have'} no torque about the vertical"
@@ -160,7 +160,7 @@ def _rests_in_orbit(m: Mechanics) -> str:
 
 
 def _central(m: Mechanics) -> str | None:
-    if not fixed_axes.one_point(m):
+    if not one_point(m):
         return None
     return "the only load is a central force" if len(m.acting) == 1 else "all loads are forces to one point"
 
@@ -296,22 +296,6 @@ register_all(
         "jacobi_constant", (), "J", "Jacobi's constant", lambda m: [jacobi_constant(m)],
         same_unit(ENERGY, 1), "", ("jacobi",),
         _rests_in_orbit, kept_energy_scale,
-    ),
-    Observable(
-        "kovalevskaya_constant", (), "rad4 s-4", "Kovalevskaya's constant",
-        lambda m: [first_integrals.kovalevskaya_constant(m)], same_unit(lambda m: -4 * m.scaling.time, 1), "",
-        ("kovalevskaya",),
-        lambda m: "A = B = 2 C, and the centre of mass lies in the equatorial plane (Kovalevskaya)",
-        first_integrals.kovalevskaya_scale,
-    ),
-    Observable(
-        "goryachev_chaplygin_constant", (), "rad3 s-3", "Goryachev's and Chaplygin's constant",
-        lambda m: [first_integrals.goryachev_chaplygin_constant(m)],
-        same_unit(lambda m: -3 * m.scaling.time, 1), "",
-        ("goryachev_chaplygin",),
-        lambda m: "A = B = 4 C, the centre of mass lies in the equatorial plane, and L_z = 0 (Goryachev, "
-        "Chaplygin)",
-        first_integrals.goryachev_chaplygin_scale,
     ),
     Observable(
         "work", (), "J", "work of the loads without a potential", _work,

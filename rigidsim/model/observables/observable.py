@@ -9,14 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model import fixed_axes
 from rigidsim.model.euler_poles import Poles
-from rigidsim.model.first_integrals import goryachev_chaplygin_top, kovalevskaya_top
 from rigidsim.model.frames import (
     first_source,
     flies_about_source,
@@ -28,7 +25,6 @@ from rigidsim.model.load import loads_of
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.si import values_in_si
-from rigidsim.scene.arithmetic import negligible
 from rigidsim.scene.choices import variables_named
 from rigidsim.scene.registry import register_observable
 from rigidsim.scene.scene import Scene
@@ -119,23 +115,6 @@ def _sourced(m: Mechanics) -> bool:
     return load is not None and (load.attracting_point is None or m.velocity is not None)
 
 
-def _isotropic_damping(m: Mechanics) -> bool:
-    """Whether the body turns, under dampings alone that add up to a multiple of the inertia tensor."""
-    found = [load.damping() for load in m.turning]
-    at_rest = all(w == 0 for w in m.scene.angular_velocity)
-    if m.carriers or not found or any(c is None for c in found) or at_rest:
-        return False
-    total = [sum((c[i] for c in found if c is not None), m.scene.context.zero) for i in range(3)]
-    inertia, k = m.scene.body.inertia, max(range(3), key=lambda i: m.scene.body.inertia[i][i])
-    wanted = [[total[k] / inertia[k][k] * x for x in row] for row in inertia]
-    differences = [(total[i] if i == j else 0) - wanted[i][j] for i in range(3) for j in range(3)]
-    return all(abs(d) <= total[k] * negligible(m.scene.context) for d in differences)
-
-
-def _keeps_axis(name: str, m: Mechanics) -> bool:
-    return m.attitude is not None and name in fixed_axes.kept_axes(m)
-
-
 NEEDS: dict[str, Need] = {
     "attitude": Need(lambda m: m.attitude is not None, lambda _: "attitude", _no_attitude),
     "flight": Need(lambda m: m.velocity is not None, lambda _: "flight", _NO_POSITION),
@@ -145,28 +124,16 @@ NEEDS: dict[str, Need] = {
     "symmetry": Need(lambda m: m.symmetry_direction is not None),
     "work": Need(carries_work),
     "jacobi": Need(lambda m: m.attitude is not None and rotating_orbit(m) is not None),
-    "kovalevskaya": Need(lambda m: kovalevskaya_top(m) is not None),
-    "goryachev_chaplygin": Need(lambda m: goryachev_chaplygin_top(m) is not None),
-    **{f"{name}_axis": Need(partial(_keeps_axis, name)) for name in ("source", "field", *"xyz")},
-    "isotropic_damping": Need(lambda m: m.attitude is not None and _isotropic_damping(m)),
     "plane": Need(
         lambda m: not flies_in_plane(m.scene, m.loads) or m.velocity is not None,
         lambda scene: "flight" if flies_in_plane(scene, loads_of(scene)) else None,
     ),
     "source": Need(_sourced, lambda scene: "flight" if flies_about_source(scene) else None, _NO_SOURCE),
     "place": Need(lambda m: not m.scene.free_flight or m.velocity is not None, _flight_of_a_free_body),
-    "sources": Need(lambda m: m.attitude is not None and fixed_axes.sources_alone(m)),
-    "several_sources": Need(lambda m: m.attitude is not None and fixed_axes.several_directions(m)),
-    "attracting_line": Need(
-        lambda m: (
-            m.velocity is not None and m.attitude is not None and fixed_axes.attracting_line(m) is not None
-        )
-    ),
     "rotors": Need(lambda m: bool(m.scene.tabled.get("rotors")), missing=_NO_ROTORS),
     "fixed_rotors": Need(lambda m: m.lent_energy is not None and not m.driven_within, missing=_NO_ROTORS),
     "point_masses": Need(lambda m: m.scene.bodies is not None, missing=_NO_POINT_MASSES),
     "kernel": Need(lambda m: m.sky is not None, missing=_NO_KERNEL),
-    "free_fall": Need(lambda m: m.velocity is not None and fixed_axes.falls_freely(m)),
     "attractor": Need(lambda m: m.velocity is not None and any(x.attracting_point for x in m.loads)),
 }
 """All needs, by the names that ``Observable.needs`` uses."""
