@@ -149,7 +149,7 @@ class _Top(NamedTuple):
 
 
 def _top(m: Mechanics, ratio: int) -> _Top | None:
-    """The scene as a top with A = B = ratio C, for 4 with L_z = 0; None for any other, or under more loads."""
+    """The scene as a top with A = B = ratio C, for 4 with L_z = 0; None for others, and under more loads."""
     context, scene = m.scene.context, m.scene
     axis, arm, tiny = m.symmetry_direction, scene.torque_arm, negligible(context)
     if m.vertical is None or axis is None or arm is None or scene.gravity is None or m.carriers:
