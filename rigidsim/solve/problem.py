@@ -282,18 +282,12 @@ def _refuse_spectrum(system: System) -> None:
     found = system.plan.surfaces.found
     if not system.scene.config.output.lyapunov or (not found and system.pieces is None):
         return
-    why = "an orbit goes by a table, at whose rows its states are set and variational equations end"
-    instead = "give the orbit by elements"
-    if not system.plan.tables:
-        why = (
-            "places go by a kernel, at the edges of whose blocks states are set and variational equations end"
-        )
-        instead = "give orbits by elements"
+    why, instead = "states are set at the edges of a table or kernel", "give orbits by elements"
     if found:
-        why = f"the equations switch at a kink or jump of {found[0].text} ({found[0].where}), where "
-        why += "variational equations end"
+        why = f"the equations switch at a kink or jump of {found[0].text} ({found[0].where})"
         instead = found[0].remedy
-    raise ConfigError(Problem("[output] lyapunov", f"given true, but {why}; set it to false, or {instead}"))
+    what = f"given true, but {why}, where variational equations end; set it to false, or {instead}"
+    raise ConfigError(Problem("[output] lyapunov", what))
 
 
 def double_twin(prepared: InitialValueProblem) -> System:

@@ -43,7 +43,6 @@ class SampleClock:
         self._divisor = math.lcm(samples.begin.denominator, samples.step.denominator)
         self._first = int(samples.begin * self._divisor)
         self._step = int(samples.step * self._divisor)
-        self._whole = {kind.bits: self._exact_numbers(kind) for kind in (precision, self._double)}
         context = samples.context
         self._per_second = precision.number(scaling.internal(context.one, context))
         self.start = precision.number(scaling.internal(rounded(samples.begin, context), context))
@@ -92,23 +91,13 @@ class SampleClock:
         if precision.bits == 53 and self._samples.times is not None:
             return self._samples.doubles[first:stop]
         if self._samples.times is None:
-            whole = self._whole[precision.bits]
-            if whole is not None and self._fits(max(stop - 1, 0), precision):
-                return (whole[0] + precision.indices(first, stop) * whole[1]) / whole[2]
+            a, b, d, last = self._first, self._step, self._divisor, max(stop - 1, 0)
+            if max(abs(a), abs(b), d, abs(b * last), abs(a + b * last)) <= 2**precision.bits:
+                begin, step, divisor = (_nearest(n, 1, precision) for n in (a, b, d))
+                return (begin + precision.indices(first, stop) * step) / divisor
         return np.array(
             [_nearest(n, d, precision) for n, d in self._rationals(first, stop)], dtype=precision.scalar
         )
-
-    def _fits(self, index: int, precision: Precision) -> bool:
-        """Whether what is divided for a sample of a grid, and for all before, fits the significand."""
-        return max(abs(self._step * index), abs(self._numerator(index))) <= 2**precision.bits
-
-    def _exact_numbers(self, precision: Precision) -> tuple[Scalar, Scalar, Scalar] | None:
-        """The numbers a, b and d; None if one of them doesn't fit the significand."""
-        a, b, d = self._first, self._step, self._divisor
-        if max(abs(a), abs(b), d) > 2**precision.bits:
-            return None
-        return _nearest(a, 1, precision), _nearest(b, 1, precision), _nearest(d, 1, precision)
 
     def _narrowed(self, doubles: np.ndarray, first: int, precision: Precision) -> np.ndarray:
         """The narrower numbers nearest to exact values, from the doubles nearest to them."""
@@ -121,14 +110,11 @@ class SampleClock:
             times[i] = _nearest(n, d, precision)
         return times
 
-    def _numerator(self, index: int) -> int:
-        return self._first + index * self._step
-
     def _rationals(self, first: int, stop: int) -> Iterator[tuple[int, int]]:
         if self._samples.times is not None:
             yield from (time.as_integer_ratio() for time in self._samples.times[first:stop])
         else:
-            yield from ((self._numerator(i), self._divisor) for i in range(first, stop))
+            yield from ((self._first + i * self._step, self._divisor) for i in range(first, stop))
 
     def _refuse_coinciding(self, samples: SampleTimes) -> None:
         """Refuse samples that coincide; spacing of a grid is resolved worst at the time of largest size."""

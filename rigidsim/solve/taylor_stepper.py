@@ -47,9 +47,8 @@ class TaylorStepper(Stepper):
         self._tolerance, self._start = tolerance, start
         self._requirement = requirement_of(system)
         self.has_events = log is not None and bool(system.crossings)
-        self._integrator = self._compiled(system)
-        self._charts = {0: self._integrator}
-        self._chart = 0
+        self._integrator, self._chart = self._compiled(system), 0
+        self._engines = {(0, self._along): self._integrator}
         far = 1e37 if precision.scalar is np.float32 else _FAR
         self._far = precision.number(system.scene.context.mpf(far))
         bounds = (longest_step(self._integrator.order, precision.scalar), _LONGEST_FOLLOWED)
@@ -99,16 +98,30 @@ class TaylorStepper(Stepper):
         assert found is not None
         return found
 
+    @property
+    def _along(self) -> tuple[int, ...]:
+        """Surfaces along which the motion slides, with equations of its own."""
+        return ()
+
     def use(self, chart: int) -> None:
-        if chart not in self._charts:
-            self._charts[chart] = interruptible(lambda: self._compiled(self._system_of(chart)))
-        self._chart, self._integrator = chart, self._charts[chart]
+        self._chart = chart
+        self._enter()
         self._longest = self._bounds[chart]
 
+    def _enter(self) -> None:
+        """Continue with the equations of this chart along the current surfaces."""
+        key = self._chart, self._along
+        if key not in self._engines:
+            system = self._system_of(self._chart)
+            self._engines[key] = interruptible(lambda: self._compiled(system))
+        entered = self._engines[key]
+        if entered is not self._integrator:
+            entered.dtime = self._integrator.dtime
+            entered.state[:] = self._integrator.state
+            self._integrator = entered
+
     def enter(self, chart: int, state: np.ndarray) -> None:
-        time = self._integrator.dtime
         self.use(chart)
-        self._integrator.dtime = time
         self._integrator.state[:] = state
 
     def _meet(self) -> Scalar | None:

@@ -127,7 +127,7 @@ def test_what_a_table_can_not_be_combined_with() -> None:
     text = by_table(40.0).split("[output]")[0] + more + "\n[tables" + by_table(40.0).split("[tables")[1]
     with pytest.raises(ConfigError, match="table") as caught:
         prepare(rigidsim.parse(text))
-    assert "an orbit goes by a table" in str(caught.value)
+    assert "edges of a table" in str(caught.value)
 
 
 @pytest.mark.slow

@@ -171,33 +171,24 @@ class Family:
     kind: int
 
 
-@dataclass(frozen=True)
 class Numbers:
-    """Numbers of a family's members (indices), float64."""
+    """Numbers of a family's members (indices), float64.
 
-    members: np.ndarray
-    initial: np.ndarray  # (states, members), internal units
-    parameters: np.ndarray  # (parameters of the traced system, members)
-    replay: Replay  # evaluates anything else that follows from their numbers, for these and others
-    places: np.ndarray  # of these members among those of ``replay``
+    Attributes:
+        initial: (states, members), internal units.
+        parameters: of the traced system, (parameters, members).
+    """
 
-    @classmethod
-    def of(cls, traced: TracedSystem, members: np.ndarray, replay: Replay, places: np.ndarray) -> Numbers:
-        """Numbers of members that share a traced system."""
-        number = traced.prepared.precision.number
-        initial = np.empty((len(traced.system.initial), len(members)))
-        for row, value in enumerate(traced.system.initial):
-            traceable = isinstance(value, Traced)
-            initial[row] = replay.doubles(value.node)[places] if traceable else number(value)
-        parameters = np.empty((len(traced.parameters.nodes), len(members)))
-        for row, node in enumerate(traced.parameters.nodes):
-            parameters[row] = replay.doubles(node)[places]
-        return cls(members, initial, parameters, replay, places)
+    def __init__(self, traced: TracedSystem, members: np.ndarray, replay: Replay, places: np.ndarray) -> None:
+        self.members, self._replay, self._places = members, replay, places  # places among those of ``replay``
+        self.initial = np.array([self.doubles(value) for value in traced.system.initial])
+        found = [replay.doubles(node)[places] for node in traced.parameters.nodes]
+        self.parameters = np.array(found).reshape(len(found), len(members))
 
     def doubles(self, value: Any) -> np.ndarray:
         """A number of the scene for each member, rounded once, (members,)."""
         if isinstance(value, Traced):
-            return self.replay.doubles(value.node)[self.places]
+            return self._replay.doubles(value.node)[self._places]
         return np.full(len(self.members), float(value))
 
     def whole_numbers(self, value: Any) -> np.ndarray:
@@ -290,11 +281,11 @@ class Families:
         taken = candidates[agree]
         if not len(taken):
             return waiting
-        numbers = Numbers.of(family.traced, taken, replay, agree)
+        numbers = Numbers(family.traced, taken, replay, agree)
         within = np.isfinite(numbers.initial).all(axis=0) & np.isfinite(numbers.parameters).all(axis=0)
         if not within.all():
             result.alone |= dict.fromkeys(taken[~within].tolist(), NotBatchable.RANGE)
-            numbers = Numbers.of(family.traced, taken[within], replay, agree[within])
+            numbers = Numbers(family.traced, taken[within], replay, agree[within])
         if len(numbers.members):
             result.groups.append((family, numbers))
         return waiting[~np.isin(waiting, taken)]

@@ -104,7 +104,6 @@ class SwitchingStepper(TaylorStepper):
         self._offset: list[int] = []  # parameters that are added to events
         self._ahead = _FIRST_AHEAD
         self._functions_by_chart: dict[int, SurfaceFunctions] = {}
-        self._engines: dict[tuple[int, tuple[int, ...]], TaylorEngine] = {}
         self._chart = 0
         self._moments = Moments(system, precision)
         self._modes = [1] * len(system.surfaces)
@@ -115,7 +114,6 @@ class SwitchingStepper(TaylorStepper):
         self._now = np.zeros(0)  # parameters that sides and equations read, all of them
         self._off, self._minus, self._plus = map(precision.of_double, (0.0, -1.0, 1.0))
         super().__init__(system, precision, tolerance, start, log)
-        self._engines[0, ()] = self._integrator
         # in the partner chart, where a run may begin, angles are plain already
         self._turned = Turned.begun(system, *self._plain(self.state, self.time))
         self._dense = self._integrator
@@ -167,11 +165,6 @@ class SwitchingStepper(TaylorStepper):
             raise ValueError(f"the checkpoint remembers {sides.shape} numbers of switching surfaces")
         return super().unpack(arrays), tuple(sides.tolist())
 
-    def use(self, chart: int) -> None:
-        self._chart = chart
-        self._enter()
-        self._longest = self._bounds[chart]
-
     def settle(self) -> None:
         """Must be called after the state was set from outside: takes the sides on which it lies."""
         # the state lies beside surfaces that it slid along
@@ -182,20 +175,8 @@ class SwitchingStepper(TaylorStepper):
 
     # --- engines --------------------------------------------------------------------------------------------
 
-    def _enter(self) -> None:
-        """Continue with the equations of this chart along the current surfaces."""
-        key = self._chart, self._along
-        if key not in self._engines:
-            system = self._system_of(self._chart)
-            self._engines[key] = interruptible(lambda: self._compiled(system, self._along))
-        entered = self._engines[key]
-        if entered is not self._integrator:
-            entered.dtime = self._integrator.dtime
-            entered.state[:] = self._integrator.state
-            self._integrator = entered
-
-    def _compiled(self, system: System, along: tuple[int, ...] = ()) -> TaylorEngine:
-        options, equations = dict(self.precision.options), system.equations
+    def _compiled(self, system: System) -> TaylorEngine:
+        options, equations, along = dict(self.precision.options), system.equations, self._along
         shifted = [u + hy.par[system.parameters + j] for j, u in enumerate(system.surfaces)]
         arguments = enumerate(of_order_one(system, shifted, system.surfaces))
         ends = [self._event(u, j) for j, u in arguments if self._free[j] and j not in along]
