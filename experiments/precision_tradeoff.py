@@ -15,7 +15,7 @@ import xarray
 
 import rigidsim
 from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Study
-from rigidsim.accuracy.bench.dataset import trusted_error
+from rigidsim.accuracy.bench import trusted_error
 from rigidsim.solve.problem import prepare
 
 SCENES = {

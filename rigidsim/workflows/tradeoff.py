@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigidsim.accuracy.bench.dataset import TOLD, BestSetting, advice, dataset_of
-from rigidsim.accuracy.bench.measure import DEFAULT, measure
+from rigidsim.accuracy.bench import DEFAULT, TOLD, BestSetting, advice, measure
 from rigidsim.errors import RigidsimError, RunFolderError
 from rigidsim.scene.choices import FULL
 from rigidsim.scene.config import Experiment
@@ -34,7 +33,7 @@ DATASET, FIGURE = "tradeoff.h5", "tradeoff.png"
 
 @dataclass(frozen=True, repr=False)
 class Tradeoff:
-    """A measurement as labelled data (see ``dataset_of``), and the advice drawn from it."""
+    """A measurement as labelled data (``rigidsim.accuracy.bench.measure``), and the advice drawn from it."""
 
     dataset: xarray.Dataset
     folder: Path | None = None
@@ -131,7 +130,7 @@ def tradeoff(
     resolved = experiment
     if experiment.config.model.level != FULL:
         resolved = experiment.having([f'model.level="{FULL}"', "model.short_period=false"])
-    dataset = dataset_of(measure(resolved, budget=budget, repeats=repeats, full=full, told=told))
+    dataset = measure(resolved, budget=budget, repeats=repeats, full=full, told=told)
     dataset = with_others(with_models(dataset, experiment), judged)
     result = Tradeoff(dataset, folder)
     if folder is not None:

@@ -6,8 +6,7 @@ import xarray
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigidsim.accuracy.bench.dataset import advice
-from rigidsim.accuracy.bench.measure import RowStatus
+from rigidsim.accuracy.bench import RowStatus, advice
 
 EPSILON = 2.0**-52
 

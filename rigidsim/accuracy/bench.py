@@ -11,7 +11,11 @@ Two integrators that are built alike can differ in speed for their whole life, b
 that speeds have to be compared over fresh processes. Speed is measured per natural step (of a closed form:
 per sample), in passes over the motion's beginning that are repeated until they can be told from noise.
 Recording costs the same in every setting and isn't counted.
+
+The measurement is labelled data, with its Pareto front and the advice that follows from it.
 """
+
+from __future__ import annotations
 
 import math
 import random
@@ -19,15 +23,15 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from itertools import chain
+from itertools import chain, groupby
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
-from typing import Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import mpmath
 import numpy as np
@@ -35,10 +39,10 @@ import numpy as np
 from rigidsim.accuracy.comparison import angles_between
 from rigidsim.accuracy.error_law import closed_form_if_any
 from rigidsim.accuracy.motion import LEAST_DIGITS, run_pilot
-from rigidsim.accuracy.setting import Setting, cost, epsilon
+from rigidsim.accuracy.setting import Setting, cost, epsilon, precision_title, precision_titled
 from rigidsim.accuracy.trial import Trial, trial_scene, try_setting
 from rigidsim.errors import ConfigError, RigidsimError
-from rigidsim.scene.choices import FORMULATIONS
+from rigidsim.scene.choices import FORMULATIONS, METHODS
 from rigidsim.scene.config import Experiment, parse
 from rigidsim.scene.scene import build_scene
 from rigidsim.solve.assembly import assemble
@@ -47,11 +51,18 @@ from rigidsim.solve.compiled import quieten_engine
 from rigidsim.solve.problem import prepare_scene
 from rigidsim.solve.status import Status
 
+if TYPE_CHECKING:
+    import xarray
+    from numpy.typing import ArrayLike
+
 # --- processes ----------------------------------------------------------------------------------------------
 
 _SHORTEST_PASS = 4e-3  # CPU seconds: the clock's own resolution is a microsecond, a call's cost ten
 _LONGEST_WARMING = 2000  # steps
 _CLOSED_ROWS = {True: 2000, False: 4}  # of a pass in double, and in mpmath
+
+Answer = tuple[Trial | None, float, str]
+"""A task's trial or its seconds per unit, and why not, or not to the end, if so."""
 
 
 @dataclass(frozen=True)
@@ -66,22 +77,14 @@ class Task:
     speed_steps: int | None = None
 
 
-@dataclass(frozen=True)
-class Answer:
-    """Result of one task: its trial or seconds per unit, and why not, or not to the end, if so."""
-
-    trial: Trial | None = None
-    seconds: float = math.nan
-    problem: str = ""
-
-
 def _tried(experiment: Experiment, task: Task, times: list[mpmath.mpf]) -> Answer:
     until = time.process_time() + task.patience
     go_on = lambda _: Status.WALL_TIME if time.process_time() > until else None  # noqa: E731
     trial = try_setting(experiment, task.setting, times, go_on=go_on)
+    problem = "" if trial.status is Status.FINISHED else trial.status.message
     if trial.status is Status.WALL_TIME:
-        return Answer(trial, problem=f"took longer than {task.patience:.3g} s, its part of the budget")
-    return Answer(trial, problem="" if trial.status is Status.FINISHED else trial.status.message)
+        problem = f"took longer than {task.patience:.3g} s, its part of the budget"
+    return trial, math.nan, problem
 
 
 def _speed(experiment: Experiment, task: Task, times: list[mpmath.mpf]) -> Answer:
@@ -118,7 +121,7 @@ def _speed(experiment: Experiment, task: Task, times: list[mpmath.mpf]) -> Answe
             count = min(2 * count, most)
         else:
             passes.append(spent / count)
-    return Answer(seconds=statistics.median(passes))
+    return None, statistics.median(passes), ""
 
 
 def work(descriptor: int) -> None:
@@ -136,10 +139,10 @@ def work(descriptor: int) -> None:
             do = _tried if task.speed_steps is None else _speed
             found = do(experiment, task, [mpmath.mpf(t) for t in task.times])
         except ConfigError as error:
-            found = Answer(problem="; ".join(map(str, error.problems)))
+            found = None, math.nan, "; ".join(map(str, error.problems))
         except (RigidsimError, OverflowError, ZeroDivisionError, ValueError) as error:
             name = "" if isinstance(error, RigidsimError) else f"{type(error).__name__}: "
-            found = Answer(problem=f"{name}{error}")
+            found = None, math.nan, f"{name}{error}"
         tasks.send(found)
 
 
@@ -178,11 +181,11 @@ class Worker:
         code = child.wait()
         if late or self._stopped:
             return None
-        return Answer(problem=f"the process that measured it ended with code {code}")
+        return None, math.nan, f"the process that measured it ended with code {code}"
 
     def _begun(self) -> tuple[subprocess.Popen[bytes], Connection]:
         ours, theirs = Pipe()
-        call = f"from rigidsim.accuracy.bench import measure; measure.work({theirs.fileno()})"
+        call = f"from rigidsim.accuracy import bench; bench.work({theirs.fileno()})"
         child = subprocess.Popen([sys.executable, "-c", call], pass_fds=[theirs.fileno()])
         theirs.close()
         ours.send((self._experiment.text, self._experiment.source))
@@ -311,8 +314,7 @@ def _settings(plan: Plan, *, full: bool) -> list[Setting]:
 # --- references ---------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class ReferenceSolution:
+class ReferenceSolution(NamedTuple):
     """Attitudes, float64 parts (samples, 4), against which others are held, and their own error (samples,),
     rad.
     """
@@ -320,6 +322,19 @@ class ReferenceSolution:
     attitudes: list[np.ndarray]
     error: np.ndarray
     how: str
+
+
+def _references(plan: Plan, found: Mapping[Task, Answer]) -> tuple[ReferenceSolution, ReferenceSolution]:
+    """The reference, and that of quadruple precision. Raises ``RigidsimError`` if there is none."""
+    if plan.exact and (exact := _attitudes(found, plan.references()[0])) is not None:
+        own = np.full(len(plan.times), 10.0 ** (2 - LEAST_DIGITS))  # two digits are left to rounding
+        best = ReferenceSolution(exact, own, f"closed form to {LEAST_DIGITS} digits")
+        return best, best
+    of_all = _reference(found, plan.times, ("quadruple", "extended", "double"))
+    if of_all is None:
+        what = "no reference could be integrated within the budget; give a larger --budget"
+        raise RigidsimError(f"tradeoff: {what}")
+    return of_all, _reference(found, plan.short_times, (LEAST_DIGITS,)) or of_all
 
 
 def _reference(
@@ -342,8 +357,8 @@ def _reference(
 
 
 def _attitudes(found: Mapping[Task, Answer], task: Task) -> list[np.ndarray] | None:
-    answer = found.get(task, Answer())
-    return None if answer.trial is None or answer.problem else answer.trial.attitudes
+    trial, _, problem = found.get(task, (None, math.nan, ""))
+    return None if trial is None or problem else trial.attitudes
 
 
 def _best_and_second(precision: str | int) -> tuple[Setting, Setting]:
@@ -354,7 +369,7 @@ def _best_and_second(precision: str | int) -> tuple[Setting, Setting]:
 
 
 @dataclass
-class Row:
+class _Row:
     """Results for one setting, over a part of the motion: its trial, the problem if there is none, and for
     each process the CPU seconds per step (closed form: per sample), its own and the default setting's.
     """
@@ -368,43 +383,18 @@ class Row:
     units: float  # that cost time: steps, or samples of a closed form
     seconds: list[tuple[float, float]] = field(default_factory=list)
 
-    @property
-    def measured(self) -> bool:
-        """Whether its attitudes were computed to the end of its part."""
-        return self.status in (RowStatus.MEASURED, RowStatus.SHORT)
-
-    def errors(self) -> tuple[np.ndarray, np.ndarray]:
-        """Attitude errors (samples,) of a measured setting, and the reference's own, rad."""
+    def measured(self, default: _Row, span: float) -> tuple[np.ndarray, list[float]]:
+        """Attitude errors (samples,) of what was computed to the end of its part, rad, and ``_NUMBERS``."""
         assert self.trial is not None
         count = min(len(self.trial.attitudes[0]), len(self.reference.error))
         mine, theirs = ([p[:count] for p in x.attitudes] for x in (self.trial, self.reference))
-        return angles_between(mine, theirs), self.reference.error[:count]
-
-    def cost(self, default: "Row") -> tuple[float, float, float]:
-        """CPU time per simulated second relative to the default's: median, least and largest over the
-        processes; nan if speed was not measured.
-        """
+        errors, own = angles_between(mine, theirs), self.reference.error[:count]
         scale = (self.units / self.part) / (default.units / default.part)
-        ratios = [scale * own / base for own, base in self.seconds] or [math.nan]
-        return statistics.median(ratios), min(ratios), max(ratios)
-
-    @property
-    def cpu_seconds(self) -> float:
-        """CPU seconds over its part: steps (or samples) times a step's median cost."""
-        return self.units * statistics.median([own for own, _ in self.seconds] or [math.nan])
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """Results for all settings, the default one first; see ``dataset_of`` for them as data."""
-
-    experiment: Experiment
-    plan: Plan
-    rows: list[Row]
-    reference: ReferenceSolution
-    wide_reference: ReferenceSolution
-    processes: int
-    seconds: float
+        ratios = [scale * one / base for one, base in self.seconds] or [math.nan]
+        spent = self.units * statistics.median([one for one, _ in self.seconds] or [math.nan])
+        relative = [statistics.median(ratios), min(ratios), max(ratios), spent]
+        counts = [self.trial.steps, self.trial.order, self.trial.work]
+        return errors, [errors[-1], errors.max(), own[-1], *relative, *counts, self.part * span]
 
 
 def measure(
@@ -414,9 +404,12 @@ def measure(
     repeats: int = 3,
     full: bool = False,
     told: Callable[[str], None] = lambda _: None,
-) -> Measurement:
-    """Measure the settings of a scene. Raises ``ConfigError``, and ``RigidsimError`` if the budget is too
-    small for anything.
+) -> xarray.Dataset:
+    """Measure the settings of a scene: xarray data of the dimensions ``setting``, ``time``, ``invariant``.
+
+    Errors are in rad, costs relative to the default setting (double precision, quaternions). Where a setting
+    was not measured, its numbers are nan and ``reason`` says why. Raises ``ConfigError``, and
+    ``RigidsimError`` if the budget is too small for anything.
     """
     if not budget >= _LEAST_BUDGET:
         raise RigidsimError(
@@ -428,41 +421,38 @@ def measure(
     plan = _plan(experiment, budget)
     settings = _settings(plan, full=full)
     wide = {s: s.precision == "quadruple" and s.has_steps for s in settings}
-    times = {True: plan.short_times, False: plan.times}
-    tasks = [Task(s, times[wide[s]], _SINGLE * budget) for s in settings]
+    tasks = [Task(s, plan.short_times if wide[s] else plan.times, _SINGLE * budget) for s in settings]
     told(f"attitudes of {len(settings)} settings")
-    done = 0
+    done, left_out = 0, (None, math.nan, f"left out: the budget of {budget:g} s was used up before its turn")
     with Worker(experiment) as worker:
         found = _explored(experiment, worker, plan.references(), tasks, begun + _EXPLORING * budget)
-        if problem := _answer(found, tasks[0], budget).problem:
+        if problem := found.get(tasks[0], left_out)[2]:
             raise RigidsimError(
                 f"tradeoff: the default setting ({DEFAULT.title}), which costs are relative to, could not be "
                 f"measured: {problem}"
             )
         told("the reference")
-        reference, of_wide = _references(plan, found)
+        references = _references(plan, found)
         rows = []
         for task in tasks:
-            answer = _answer(found, task, budget)
+            trial, _, problem = found.get(task, left_out)
             part = plan.short if wide[task.setting] else plan.part
             status = RowStatus.MEASURED if part >= plan.part else RowStatus.SHORT
-            if answer.problem:
+            if problem:
                 status = RowStatus.FAILED if task in found else RowStatus.LEFT_OUT
-            units = math.nan if answer.trial is None else answer.trial.steps
+            units = math.nan if trial is None else trial.steps
             units = units if task.setting.has_steps else plan.samples * part
-            against = of_wide if wide[task.setting] else reference
-            rows.append(Row(task.setting, part, against, status, answer.problem, answer.trial, units))
-        for repeat in range(repeats):
-            until = begun + 1.1 * budget
-            if repeat and time.monotonic() > until:
-                break
-            told(f"speeds, process {repeat + 1} of {repeats}")
-            if repeat == 0:
-                done += _timed(worker, plan, rows, repeat, max(until, time.monotonic() + 30.0))
-                continue
-            with Worker(experiment) as fresh:
-                done += _timed(fresh, plan, rows, repeat, until)
-    return Measurement(experiment, plan, rows, reference, of_wide, done, time.monotonic() - begun)
+            against = references[wide[task.setting]]
+            rows.append(_Row(task.setting, part, against, status, problem, trial, units))
+        until = begun + 1.1 * budget
+        told(f"speeds, process 1 of {repeats}")
+        done += _timed(worker, plan, rows, 0, max(until, time.monotonic() + 30.0))
+        for repeat in range(1, repeats):
+            if time.monotonic() < until:
+                told(f"speeds, process {repeat + 1} of {repeats}")
+                with Worker(experiment) as fresh:
+                    done += _timed(fresh, plan, rows, repeat, until)
+    return _dataset_of(experiment, plan, rows, references, done, time.monotonic() - begun)
 
 
 def _explored(
@@ -486,43 +476,224 @@ def _explored(
     return found
 
 
-def _answer(found: Mapping[Task, Answer], task: Task, budget: float) -> Answer:
-    left_out = f"left out: the budget of {budget:g} s was used up before its turn"
-    return found.get(task, Answer(problem=left_out))
-
-
-def _references(plan: Plan, found: Mapping[Task, Answer]) -> tuple[ReferenceSolution, ReferenceSolution]:
-    """The reference, and that of quadruple precision. Raises ``RigidsimError`` if there is none."""
-    exact = _attitudes(found, plan.references()[0]) if plan.exact else None
-    if exact is not None:
-        own = np.full(len(plan.times), 10.0 ** (2 - LEAST_DIGITS))  # two digits are left to rounding
-        best = ReferenceSolution(exact, own, f"closed form to {LEAST_DIGITS} digits")
-        return best, best
-    of_all = _reference(found, plan.times, ("quadruple", "extended", "double"))
-    if of_all is None:
-        what = "no reference could be integrated within the budget; give a larger --budget"
-        raise RigidsimError(f"tradeoff: {what}")
-    return of_all, _reference(found, plan.short_times, (LEAST_DIGITS,)) or of_all
-
-
-def _timed(worker: Worker, plan: Plan, rows: list[Row], repeat: int, until: float) -> bool:
+def _timed(worker: Worker, plan: Plan, rows: list[_Row], repeat: int, until: float) -> bool:
     """Measure speeds in one process, in an order of its own; the default setting's at the beginning, in the
     middle and at the end. Returns whether all were measured.
     """
-    default, *others = [row for row in rows if row.measured]
+    default, *others = [row for row in rows if row.status in (RowStatus.MEASURED, RowStatus.SHORT)]
     random.Random(repeat).shuffle(others)
     middle = len(others) // 2
     turns = [default, *others[:middle], default, *others[middle:], default]
-    found: list[tuple[Row, float]] = []
+    found: list[tuple[_Row, float]] = []
     for row in turns:
         steps = 1 if row.trial is None else max(1, row.trial.steps)
         answer = worker.answer(Task(row.setting, plan.times, _PASSES, steps), until)
         if answer is None:
             break
-        found += [(row, answer.seconds)] * (not answer.problem)
+        found += [(row, answer[1])] * (not answer[2])
     base = statistics.median([seconds for row, seconds in found if row is default] or [math.nan])
     default.seconds += [(base, base)] * (not math.isnan(base))
     for row, seconds in found:
         if row is not default:
             row.seconds.append((seconds, base))
     return len(found) == len(turns)
+
+
+# --- labelled data ------------------------------------------------------------------------------------------
+
+TOLD = (
+    "compared",
+    "reference",
+    "horizon_seconds",
+    "measured_seconds",
+    "closed_form",
+    "processes",
+    "seconds",
+)
+"""Attributes of a measurement that its JSON repeats."""
+
+
+_RELATIVE = "relative to the default setting, per simulated second"
+_NUMBERS = {
+    "attitude_error_final": ("rad", "attitude error at the end of what was measured"),
+    "attitude_error_largest": ("rad", "largest attitude error"),
+    "reference_error": ("rad", "error of the reference itself, estimated, at the end"),
+    "cpu_ratio": ("1", f"CPU time, median of the processes, {_RELATIVE}"),
+    "cpu_ratio_least": ("1", f"CPU time, least of the processes, {_RELATIVE}"),
+    "cpu_ratio_largest": ("1", f"CPU time, largest of the processes, {_RELATIVE}"),
+    "cpu_seconds": ("s", "CPU time of the measured part"),
+    "steps": ("1", "natural Taylor steps"),
+    "taylor_order": ("1", "order of the Taylor series"),
+    "work": ("1", "steps x order^2 x states"),
+    "measured_time": ("s", "how much of the motion was measured"),
+}
+"""Numbers of a setting, nan where it wasn't measured: units and what they are."""
+
+
+def _dataset_of(
+    experiment: Experiment,
+    plan: Plan,
+    rows: Sequence[_Row],
+    references: Sequence[ReferenceSolution],
+    processes: int,
+    seconds: float,
+) -> xarray.Dataset:
+    import xarray
+
+    from rigidsim.store.provenance import versions
+
+    drifts = [{} if row.trial is None else row.trial.drifts for row in rows]
+    names = sorted({name for one in drifts for name in one})
+    error = np.full((len(rows), len(plan.times)), np.nan)
+    columns: dict[str, list[float]] = {name: [math.nan] * len(rows) for name in _NUMBERS}
+    for n, row in enumerate(rows):
+        if row.status in (RowStatus.MEASURED, RowStatus.SHORT):
+            errors, values = row.measured(rows[0], plan.span)
+            error[n, : len(errors)] = errors
+            for name, value in zip(_NUMBERS, values, strict=True):
+                columns[name][n] = float(value)
+
+    def words(values: Iterable[object]) -> np.ndarray:
+        return np.array([str(value) for value in values], dtype=object)
+
+    def variable(
+        values: ArrayLike, units: str, long_name: str, dims: Sequence[str] = ("setting",)
+    ) -> tuple[Sequence[str], ArrayLike, dict[str, str]]:
+        return (dims, values, {"units": units, "long_name": long_name})
+
+    settings = [row.setting for row in rows]
+    drift = np.array([one.get(name, np.nan) for one in drifts for name in names]).reshape(len(rows), -1)
+    tolerances = [s.step_tolerance if s.has_steps else math.nan for s in settings]
+    precisions = words(precision_title(s.precision) for s in settings)
+    held = np.array([s.hold_invariants for s in settings], dtype=np.int8)
+    across = ("setting", "invariant")
+    data = xarray.Dataset(
+        {
+            "status": variable(words(r.status.value for r in rows), "1", "what became of the setting"),
+            "reason": variable(words(r.problem for r in rows), "1", "why it was not measured"),
+            "attitude_error": variable(error, "rad", "attitude error", ("setting", "time")),
+            **{name: variable(columns[name], *said) for name, said in _NUMBERS.items()},
+            "drift": variable(drift, "1", "largest relative drift of the invariant", across),
+        },
+        coords={
+            "setting": ("setting", words(s.title for s in settings), {"long_name": "setting"}),
+            "precision": variable(precisions, "1", "arithmetic"),
+            "tolerance": variable(tolerances, "1", "of the step control"),
+            "formulation": variable(words(s.formulation for s in settings), "1", "of the attitude"),
+            "held": variable(held, "1", "invariants projected"),
+            "method": variable(words(s.method for s in settings), "1", " or ".join(METHODS)),
+            "time": ("time", np.array(plan.times), {"units": "s", "long_name": "since start of the scene"}),
+            "invariant": ("invariant", words(names), {"long_name": "invariant"}),
+        },
+        attrs={
+            "title": experiment.config.name,
+            "config": experiment.text,
+            "config_sha256": experiment.sha256,
+            "compared": "attitudes, carried in every setting, whatever the config records",
+            "reference": references[0].how,
+            "reference_of_quadruple": references[1].how,
+            "default_setting": DEFAULT.title,
+            "horizon_seconds": plan.span,
+            "measured_seconds": plan.part * plan.span,
+            "closed_form": "yes" if plan.exact else f"none: {plan.why}",
+            "processes": processes,
+            "seconds": seconds,
+            **versions(),
+        },
+    )
+    front = on_front(data).astype(np.int8)
+    data["on_front"] = variable(front, "1", "no other setting is both cheaper and more accurate")
+    return data
+
+
+def trusted_error(dataset: xarray.Dataset) -> np.ndarray:
+    """Largest attitude errors, but at least what the reference can resolve."""
+    largest, own = dataset["attitude_error_largest"].values, dataset["reference_error"].values
+    return np.asarray(np.maximum(largest, own))
+
+
+def on_front(dataset: xarray.Dataset) -> np.ndarray:
+    """Whether no setting is both cheaper and at least as accurate; only for settings measured over the full
+    length, since errors over less of a motion don't compare.
+    """
+    error, cost = trusted_error(dataset), dataset["cpu_ratio"].values
+    fit = (dataset["status"].values == RowStatus.MEASURED.value) & np.isfinite(error) & np.isfinite(cost)
+    result = np.zeros(len(error), dtype=bool)
+    best = math.inf
+    for n in sorted(np.nonzero(fit)[0], key=lambda n: (cost[n], error[n])):
+        if error[n] < best:
+            best, result[n] = error[n], True
+    return result
+
+
+@dataclass(frozen=True)
+class BestSetting:
+    """For an attitude error of at most ``at_most`` and more than ``more_than``: the cheapest setting, its
+    largest error (rad), its cost relative to the default setting's and in CPU seconds of the part measured,
+    and whether it was measured over less than the others, so that costs don't compare.
+    """
+
+    at_most: float
+    more_than: float
+    title: str
+    error: float
+    cost: float
+    seconds: float
+    cpu_seconds: float
+    less: bool
+    keys: tuple[str, ...]
+
+
+def advice(dataset: xarray.Dataset) -> list[BestSetting]:
+    """For each decade of accuracy from 1 rad on, the cheapest setting that reaches it.
+
+    A setting that was measured over less of the motion is named only if no other reaches the accuracy.
+    """
+    error, cost = trusted_error(dataset), dataset["cpu_ratio"].values
+    status = dataset["status"].values
+    known = np.isfinite(error) & np.isfinite(cost)
+    if not known.any():
+        return []
+    smallest = max(float(error[known].min()), 1e-60)
+    found: list[tuple[int, int, bool]] = []  # exponent, setting, measured over less
+    for exponent in range(0, math.floor(math.log10(smallest)) - 1, -1):
+        for kind in (RowStatus.MEASURED, RowStatus.SHORT):
+            fit = np.nonzero(known & (status == kind.value) & (error <= 10.0**exponent))[0]
+            if len(fit):
+                found.append((exponent, int(min(fit, key=lambda n: cost[n])), kind is RowStatus.SHORT))
+                break
+    result: list[BestSetting] = []
+    for n, decades in groupby(found, key=lambda best: best[1]):
+        same = list(decades)
+        (exponent, _, less), (last, _, _) = same[0], same[-1]
+        one = dataset.isel(setting=n)
+        result.append(
+            BestSetting(
+                at_most=10.0**exponent,
+                more_than=10.0 ** (last - 1),
+                title=str(one["setting"].item()),
+                error=float(error[n]),
+                cost=float(one["cpu_ratio"]),
+                seconds=float(one["measured_time"]),
+                cpu_seconds=float(one["cpu_seconds"]),
+                less=less,
+                keys=_keys(one),
+            )
+        )
+    return result
+
+
+def _keys(one: xarray.Dataset) -> tuple[str, ...]:
+    """The setting as lines for ``[integrator]``."""
+    precision = precision_titled(str(one["precision"].item()))
+    keys = [f"precision = {precision}" if isinstance(precision, int) else f'precision = "{precision}"']
+    default, method, tolerance = Setting(precision), one["method"].item(), float(one["tolerance"])
+    if method != default.method:
+        keys.append(f'method = "{method}"')
+    if math.isfinite(tolerance) and tolerance != default.step_tolerance:
+        keys.append(f"tolerance = {tolerance:.0e}")
+    if one["formulation"].item() != default.formulation:
+        keys.append(f'formulation = "{one["formulation"].item()}"')
+    if one["held"].item():
+        keys.append("hold_invariants = true")
+    return tuple(keys)

@@ -1,1 +1,0 @@
-"""Measuring speed and accuracy of a scene's settings."""
