@@ -24,7 +24,7 @@ from rigidsim.accuracy.comparison import (
 )
 from rigidsim.accuracy.motion import KnownMotion, motion_of, references, scatter_of
 from rigidsim.accuracy.setting import Setting, setting_of
-from rigidsim.accuracy.trial import TrialProgress, Trials, try_setting
+from rigidsim.accuracy.trial import TrialProgress, finished_trial, try_setting
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
 
@@ -82,7 +82,7 @@ def certify(
     if dataset.sizes["time"] == 0:
         return None
     motion, setting = known or motion_of(experiment, loads=loads), setting_of(experiment)
-    trials, of_path = Trials(experiment, loads, told), accuracy_position is not None
+    of_path = accuracy_position is not None
 
     @cache
     def run_at(most: int) -> tuple[list[mpmath.mpf], list[np.ndarray], list[np.ndarray]]:
@@ -99,7 +99,7 @@ def certify(
     best: Certificate | None = None
     for reference in references(setting, motion, accuracy):
         times, attitudes, places = run_at(_TIMES if reference.has_steps else _WIDE_TIMES)
-        better = trials.whole(reference, times)
+        better = finished_trial(experiment, reference, times, loads, told)
         if better is None:
             continue
         apart = angles_between(attitudes, better.attitudes)

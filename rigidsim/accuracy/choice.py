@@ -14,8 +14,11 @@ Choices depend on counts alone, never on a clock, so that a config always choose
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
-from rigidsim.accuracy.comparison import spread_times
+import numpy as np
+
+from rigidsim.accuracy.comparison import angles_between, spread_times
 from rigidsim.accuracy.error_law import CLOSED_FORM
 from rigidsim.accuracy.modelling import Unmeasured, measure_modelling
 from rigidsim.accuracy.motion import PILOT_STEPS, KnownMotion, motion_of, stepped_reference
@@ -29,7 +32,7 @@ from rigidsim.accuracy.setting import (
     setting_of,
     wanted,
 )
-from rigidsim.accuracy.trial import TrialProgress, Trials
+from rigidsim.accuracy.trial import TrialProgress, finished_trial
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load import Load
 from rigidsim.scene.choices import (
@@ -187,11 +190,11 @@ class _Forecasts:
         loads: Sequence[Load],
         told: TrialProgress | None,
     ) -> None:
-        self._accuracy, self._trials = accuracy, Trials(experiment, loads, told)
-        self.motion = motion_of(experiment, loads=loads)
+        self._accuracy, self.motion = accuracy, motion_of(experiment, loads=loads)
         self._samples = build_scene(experiment).samples.count
         self.part = min(1.0, PILOT_STEPS / self.motion.steps)
-        self._times = spread_times(experiment, _TIMES, self.part)
+        times = spread_times(experiment, _TIMES, self.part)
+        self._trial = cache(lambda setting: finished_trial(experiment, setting, times, loads, told))
         self._measured: dict[Setting, float] = {}
 
     def cost(self, setting: Setting) -> float:
@@ -249,18 +252,21 @@ class _Forecasts:
             precision = "double" if self._obvious(setting) else "extended"
             steps = self.motion.steps * self.part
             better = stepped_reference(precision, self.motion, steps, setting.formulation)
-            errors = self._trials.compare(setting, better, self._times)
-            if errors is None:
-                self._measured[setting] = math.inf
-            elif (late := float(errors.max())) > _SATURATED:  # only the law says how large it would be
-                self._measured[setting] = max(late, self.motion.error(setting.level))
-            else:
-                late, early = max(late, epsilon(setting.precision)), float(errors[: len(errors) // 4].max())
-                self._measured[setting] = late if self.part >= 1 else self._at_end(early, late, setting)
+            trial, reference = self._trial(setting), self._trial(better)
+            self._measured[setting] = math.inf
+            if trial is not None and reference is not None:
+                errors = angles_between(trial.attitudes, reference.attitudes)
+                self._measured[setting] = self._at_end(errors, setting)
         return self._measured[setting]
 
-    def _at_end(self, early: float, late: float, setting: Setting) -> float:
+    def _at_end(self, errors: np.ndarray, setting: Setting) -> float:
         """Error from the largest over the first quarter of a trial and over all of it."""
+        late, early = float(errors.max()), float(errors[: len(errors) // 4].max())
+        if late > _SATURATED:  # only the law says how large it would be
+            return max(late, self.motion.error(setting.level))
+        late = max(late, epsilon(setting.precision))
+        if self.part >= 1:
+            return late
         growth, longer = math.log(late / max(early, late * 1e-300)), 1 / self.part
         power = growth / math.log(4)
         if power > _EXPONENTIAL:

@@ -9,7 +9,7 @@ than the windows is followed to its end instead. The errors of the integration i
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -71,22 +71,15 @@ class _Carrying:
         across it all the time: what is made at different times adds up whatever its sign, which need not stay
         the same.
         """
-        largest = 0.0
-        for error in self.errors(along, across):
-            largest = max(largest, error)
+        made, largest = np.diag([along, across]) * self.seconds / 2, 0.0
+        errors = np.zeros((2, 0))  # a column for each time and component
+        for step in self.maps:
+            # half of a stretch's errors at its beginning, half at its end
+            errors = np.hstack([step @ errors, step @ made + made])
+            largest = max(largest, math.hypot(*np.abs(errors).sum(axis=1)))
             if largest > math.pi:
                 break
         return largest
-
-    def errors(self, along: float, across: float) -> Iterator[float]:
-        """Errors (rad) at the ends of the stretches, as of ``grown``."""
-        made = np.diag([along, across]) * self.seconds / 2
-        errors = np.empty((2, 2 * len(self.maps)))  # a column for each time and component
-        for n, step in enumerate(self.maps):
-            errors[:, : 2 * n] = step @ errors[:, : 2 * n]
-            # half of a stretch's errors at its beginning, half at its end
-            errors[:, 2 * n : 2 * n + 2] = step @ made + made
-            yield math.hypot(*np.abs(errors[:, : 2 * n + 2]).sum(axis=1))
 
 
 def _carrying(
@@ -110,8 +103,8 @@ def _carrying(
     made, double = Derivatives.of(system), precision_of("double")
     places = [system.states.index(name) for name in DIRECTION]
     moving = made.felt(places)
-    compact = average.over_orbits or system.wide  # few steps
-    tangents = Tangents(made, moving, 2, double, compact_mode=compact, tol=_TOLERANCE)
+    few_steps = average.over_orbits or system.wide
+    tangents = Tangents(made, moving, 2, double, compact_mode=few_steps, tol=_TOLERANCE)
     own = [moving.index(place) for place in places]
     state = np.array([float(x) for x in system.initial])
     tangents.begin(
@@ -143,16 +136,11 @@ def _carrying(
 def _problem(prepared: InitialValueProblem, average: Average | None) -> InitialValueProblem:
     """The averaged motion that is followed: averaged over the orbits as well, if it can be."""
     scene, names = prepared.scene, ["momentum_axis"]
-    if average is not None and not average.over_orbits:
-        with suppress(ConfigError):
-            return in_model(prepared, scene, names, ORBIT_AVERAGED, None)
-        return in_model(prepared, scene, names, average.level, average)
-    return in_model(prepared, scene, names, ORBIT_AVERAGED, average)
-
-
-def _along(path: np.ndarray) -> np.ndarray:
-    """Unit vectors, as rows, along a path of directions and across it."""
-    return _basis(path[len(path) // 2], path[-1] - path[0])
+    if average is None or average.over_orbits:
+        return in_model(prepared, scene, names, ORBIT_AVERAGED, average)
+    with suppress(ConfigError):
+        return in_model(prepared, scene, names, ORBIT_AVERAGED, None)
+    return in_model(prepared, scene, names, average.level, average)
 
 
 def _basis(direction: np.ndarray, towards: np.ndarray, otherwise: np.ndarray | None = None) -> np.ndarray:
@@ -233,9 +221,9 @@ def side_by_side(
     exponent = prepared.system.scaling.momentum
     rotations = abs(end - begin) * max(rotation_rates(motion_at(average, states, exponent))) / _TURN
     count = int(min(max(_FEWEST_SAMPLES, _SAMPLES_PER_ROTATION * rotations), _MOST_SAMPLES))
-    scene = _starting(prepared.scene, average, begin, end, states, exponent, count)
+    scene = _starting(prepared, average, begin, end, states, count)
     if begin != float(prepared.scene.start):
-        scene = with_bodies(scene, prepared, states)
+        scene = _with_bodies(scene, prepared, states)
     # whether what averaging removed can be added back
     back = average.resonance is None and average.driven is None
     names = ["momentum_axis"] + (["figure_axis"] if average.figure else [])
@@ -247,7 +235,8 @@ def side_by_side(
         _, plain = _followed(prepared, scene, average, False, names, go_on)
     times = np.linspace(0.0, abs(end - begin), count)
     apart = true["momentum_axis"] - reduced["momentum_axis"]
-    growth, doubt = _growth(times, apart @ _along(plain["momentum_axis"]).T)
+    path = plain["momentum_axis"]
+    growth, doubt = _growth(times, apart @ _basis(path[count // 2], path[-1] - path[0]).T)
 
     def distances(model: Mapping[str, np.ndarray]) -> tuple[float, float | None]:
         momentum, *figure = (float(np.linalg.norm(true[x] - model[x], axis=1).max()) for x in names)
@@ -271,33 +260,31 @@ def side_by_side(
 def _changes(
     times: np.ndarray, true: Mapping[str, np.ndarray], reduced: Mapping[str, np.ndarray]
 ) -> dict[str, Change]:
+    size, energy = (
+        true[SIZE].ravel() / reduced[SIZE].ravel(),
+        true[_OF_ROTATION].ravel() / reduced[ENERGY].ravel(),
+    )
     found, weights = {}, np.hanning(len(times))
-    ratios = {
-        SIZE: true[SIZE].ravel() / reduced[SIZE].ravel(),
-        ENERGY: true[_OF_ROTATION].ravel() / reduced[ENERGY].ravel(),
-    }
-    ratios[SHAPE] = ratios[ENERGY] / ratios[SIZE] ** 2
-    for name, ratio in ratios.items():
-        apart = ratio - 1
-        (growth,), doubt = _growth(times, apart[:, None])
-        mean = float(weights @ apart / weights.sum())
-        found[name] = Change(float(np.abs(apart).max()), mean, float(growth), doubt)
+    for name, ratio in {SIZE: size, ENERGY: energy, SHAPE: energy / size**2}.items():
+        (growth,), doubt = _growth(times, (ratio - 1)[:, None])
+        mean = float(weights @ (ratio - 1) / weights.sum())
+        found[name] = Change(float(np.abs(ratio - 1).max()), mean, float(growth), doubt)
     return found
 
 
 def _starting(
-    scene: Scene,
+    prepared: InitialValueProblem,
     average: Average,
     begin: float,
     end: float,
     states: Sequence[Any],
-    exponent: int,
     count: int,
 ) -> Scene:
     """The full scene from a time on: the body as at its start, turned by the smallest rotation that brings
     its momentum to the present one; in a resonance, as given by the slow motion; under torques of the body
     alone, on the present polhode.
     """
+    scene, exponent = prepared.scene, prepared.system.scaling.momentum
     context = scene.context
     instant = fraction_of(context.mpf(begin)) if begin != float(scene.start) else scene.samples.begin
     step = Fraction(end - begin) / (count - 1)
@@ -321,13 +308,12 @@ def _starting(
     turn = [1 + dot(before, now), *cross(before, now)]
     if dot(turn, turn) < context.mpf(2) ** -60:  # to the opposite: about any axis across
         least = min(range(3), key=lambda i: abs(before[i]))
-        other = [context.one if i == least else context.zero for i in range(3)]
-        turn = [context.zero, *cross(before, other)]
+        turn = [context.zero, *cross(before, [context.mpf(i == least) for i in range(3)])]
     quaternion = attitude.product(attitude.unit_quaternion(context, turn), list(scene.quaternion))
     return replace(moved, quaternion=attitude.unit_quaternion(context, quaternion), euler_angles=None)
 
 
-def with_bodies(scene: Scene, prepared: InitialValueProblem, states: Sequence[Any]) -> Scene:
+def _with_bodies(scene: Scene, prepared: InitialValueProblem, states: Sequence[Any]) -> Scene:
     """The scene with its point masses where the averaged motion's states have them."""
     if scene.bodies is None:
         return scene
@@ -352,21 +338,20 @@ def _followed(
 ) -> tuple[int, dict[str, np.ndarray]]:
     """Steps, and the variables asked for at all samples. Raises ``Unmeasured``."""
     level = FULL if average is None else average.level
-    words = f'level = "{level}" from {float(scene.start):.6g} s on'
+    words, code = f'level = "{level}" from {float(scene.start):.6g} s on', UnmeasuredCode
     try:
         # what the run averages over is known: a window that decided anew might decide otherwise
         problem = in_model(prepared, scene, names, level, average, short_period=short_period)
     except ConfigError as error:
-        code = UnmeasuredCode.FULL_REFUSED if average is None else UnmeasuredCode.AVERAGED_REFUSED
-        why = "; ".join(problem.what for problem in error.problems)
-        raise Unmeasured(code, f"{words} can't be followed: {why}") from None
+        why = f"{words} can't be followed: {'; '.join(problem.what for problem in error.problems)}"
+        raise Unmeasured(code.FULL_REFUSED if average is None else code.AVERAGED_REFUSED, why) from None
     found = Collected(problem, names, lambda _: None if go_on() else Status.INTERRUPTED)
     progress = found.progress
     if progress.status is Status.INTERRUPTED:
-        raise Unmeasured(UnmeasuredCode.INTERRUPTED, "the measurement was interrupted")
+        raise Unmeasured(code.INTERRUPTED, "the measurement was interrupted")
     if progress.status is not Status.FINISHED:
-        code = UnmeasuredCode.FULL_STOPPED if average is None else UnmeasuredCode.AVERAGED_STOPPED
-        raise Unmeasured(code, f"{words} ended early: {progress.status.message}")
+        why = f"{words} ended early: {progress.status.message}"
+        raise Unmeasured(code.FULL_STOPPED if average is None else code.AVERAGED_STOPPED, why)
     return progress.steps, {name: found[name][0] for name in names}
 
 
@@ -569,11 +554,9 @@ def _extrapolated(
     carried: _Carrying | None,
 ) -> tuple[float, float]:
     """How far the momentum's direction is off at the end, from its growth in windows, and its oscillation."""
-    rates = np.array([(w.kept.growth_along, w.kept.growth_across) for w in windows])
-    doubt = max(w.kept.doubt for w in windows)
-    mean = np.abs(rates.mean(axis=0)) + (rates.max(axis=0) - rates.min(axis=0)) / 2
-    along, across = (float(x) + doubt for x in mean)
-    faster = 0.0
+    doubts, faster = [w.kept.doubt for w in windows], 0.0
+    along = _lasting([w.kept.growth_along for w in windows], doubts)
+    across = _lasting([w.kept.growth_across for w in windows], doubts)
     if average.driven is not None and average.sources:
         # lasting errors of size and energy change the rate of precession; what oscillates doesn't
         kept = [
@@ -598,19 +581,21 @@ def _extrapolated(
 
 def _changed(average: Average, windows: Sequence[Window], span: float) -> dict[str, float]:
     """Relative errors until the end of quantities that change."""
-    found: dict[str, float] = {}
     if average.driven is None:
-        return found
-    for name in (SIZE, ENERGY):
-        largest = max(window.changes[name].largest for window in windows)
-        grown = _grown(windows, name, span)
-        found[name] = _SPARE * grown + _SPARE_OF_WHOLE * (largest + average.driven.passed)
-    return found
+        return {}
+    largest = {name: max(window.changes[name].largest for window in windows) for name in (SIZE, ENERGY)}
+    return {
+        name: _SPARE * _grown(windows, name, span) + _SPARE_OF_WHOLE * (most + average.driven.passed)
+        for name, most in largest.items()
+    }
 
 
 def _grown(windows: Sequence[Window], name: str, seconds: float) -> float:
     """By how much the relative error of a changing quantity grows."""
     seen = [window.changes[name] for window in windows]
-    rates = np.array([change.growth for change in seen])
-    rate = abs(rates.mean()) + (rates.max() - rates.min()) / 2 + max(change.doubt for change in seen)
-    return float(rate) * seconds
+    return _lasting([change.growth for change in seen], [change.doubt for change in seen]) * seconds
+
+
+def _lasting(rates: Sequence[float], doubts: Sequence[float]) -> float:
+    """Size of a rate that was measured in some windows and varies between them, each with its doubt."""
+    return abs(float(np.mean(rates))) + (max(rates) - min(rates)) / 2 + max(doubts)

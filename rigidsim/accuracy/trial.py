@@ -3,12 +3,11 @@
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import mpmath
 import numpy as np
 
-from rigidsim.accuracy.comparison import angles_between
 from rigidsim.accuracy.setting import Setting
 from rigidsim.errors import ConfigError
 from rigidsim.model.load import Load
@@ -154,35 +153,20 @@ def try_setting(
     )
 
 
-@dataclass
-class Trials:
-    """Trials of one motion, in compact code, each made once."""
-
-    experiment: Experiment
-    loads: Sequence[Load] = ()
-    told: TrialProgress | None = None
-    _made: dict[tuple[Setting, tuple[mpmath.mpf, ...]], Trial | None] = field(default_factory=dict)
-
-    def whole(self, setting: Setting, times: Sequence[mpmath.mpf]) -> Trial | None:
-        """A trial that reached the last of the times (s, mpf); None if the scene can't be integrated with the
-        setting (a chart, a load, no closed form), or not so far.
-        """
-        key = setting, tuple(times)
-        if key not in self._made:
-            made = None
-            with suppress(ConfigError):
-                made = try_setting(
-                    self.experiment, setting, times, loads=self.loads, compact=True, told=self.told
-                )
-            self._made[key] = made if made is not None and made.status is Status.FINISHED else None
-        return self._made[key]
-
-    def compare(self, setting: Setting, reference: Setting, times: Sequence[mpmath.mpf]) -> np.ndarray | None:
-        """Attitude differences (times,), rad, between a setting's trial and its reference's; None if one of
-        them is impossible.
-        """
-        one, other = self.whole(setting, times), self.whole(reference, times)
-        return None if one is None or other is None else angles_between(one.attitudes, other.attitudes)
+def finished_trial(
+    experiment: Experiment,
+    setting: Setting,
+    times: Sequence[mpmath.mpf],
+    loads: Sequence[Load],
+    told: TrialProgress | None,
+) -> Trial | None:
+    """A trial in compact code that reached the last of the times (s, mpf); None if the scene can't be
+    integrated with the setting (a chart, a load, no closed form), or not so far.
+    """
+    with suppress(ConfigError):
+        made = try_setting(experiment, setting, times, loads=loads, compact=True, told=told)
+        return made if made.status is Status.FINISHED else None
+    return None
 
 
 def compactly(prepared: InitialValueProblem) -> InitialValueProblem:
