@@ -8,15 +8,23 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Discriminator, Field, StrictInt, StrictStr, Tag
 
-from rigidsim.errors import ConfigError, Problem, Remedy
+from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.exact import ZERO, rounded
-from rigidsim.scene.fields import NAME_OR_VECTOR, ConfigTable, Instant, Second, TimeUnitName
-from rigidsim.scene.validation_messages import shown
+from rigidsim.scene.fields import (
+    NAME_OR_VECTOR,
+    ConfigTable,
+    Instant,
+    Positive,
+    Rule,
+    Second,
+    TimeUnitName,
+    one_of,
+)
 
 _MOST_SAMPLES = 10**12
 _BITS, _MOST_BITS = 53, 1000  # of a significand, and of a denominator above which doubles lose digits
@@ -27,13 +35,17 @@ class Time(ConfigTable):
     the unit that times are shown in.
     """
 
+    rules: ClassVar[tuple[Rule, ...]] = (
+        one_of("samples", "every", "times", least=0, why="--set time.KEY= removes one"),
+    )
+
     start: Second = ZERO
     """start of the run, to which [initial] refers"""
     end: Second | None = Field(None, examples=[1000.0, "10 yr"])
     """end of the run; with samples or every. Before start, the run goes backwards in time"""
     samples: StrictInt | None = Field(None, examples=[10001])
     """number of samples, equally spaced from start to end, both included"""
-    every: Second | None = Field(None, examples=[0.1, "1 day"])
+    every: Positive[Second] | None = Field(None, examples=[0.1, "1 day"])
     """interval between samples, instead of samples; above zero, backwards too"""
     times: (
         Annotated[
@@ -144,11 +156,6 @@ def sample_times(table: Time, context: Any, texts: Mapping[str, str]) -> tuple[A
     Args:
         texts: of tables, by name.
     """
-    ways = [key for key in ("samples", "every", "times") if getattr(table, key) is not None]
-    if len(ways) > 1:
-        less = Remedy(f"--set time.{ways[0]}= removes it", "Experiment.replace removes keys, too")
-        allowed = "only one of samples, every, times is allowed: leave the other out"
-        raise _fail(ways[1], f"given with {ways[0]}; {allowed} ({less})")
 
     def shortly(time: Fraction, digits: int = 12) -> str:
         return str(context.nstr(rounded(time, context), digits))
@@ -158,60 +165,35 @@ def sample_times(table: Time, context: Any, texts: Mapping[str, str]) -> tuple[A
         times = _listed(table, context, texts)
         if not times:
             raise _fail("times", "given an empty array; at least one time is needed")
-        doubles = _doubles(times)
         end = table.end.fraction(context) if table.end is not None else times[-1]
-        way = -1 if end < start else 1
-        order, after, before = (
-            ("increase", "later", "earlier") if way > 0 else ("decrease", "earlier", "later")
-        )
+        way, order = (-1, "decrease") if end < start else (1, "increase")
+        whole = [start, *times, end]
+        doubles = way * _doubles(whole)
         # rounding to doubles keeps order, so that only equal ones need a closer look
-        for i in np.flatnonzero(~(way * doubles[1:] > way * doubles[:-1])).tolist():
-            a, b = times[i], times[i + 1]
-            if not way * a < way * b:
-                raise _fail(f"times[{i + 1}]", f"given {shortly(b)} after {shortly(a)}; times must {order}")
-        if way * times[0] < way * start:
-            raise _fail(
-                "times[0]", f"given {shortly(times[0])} s; start ({shortly(start)} s) or {after} is allowed"
-            )
-        if way * times[-1] > way * end:
-            raise _fail(
-                f"times[{len(times) - 1}]",
-                f"given {shortly(times[-1])} s; end ({shortly(end)} s) or {before} is allowed",
-            )
+        for i in np.flatnonzero(~(doubles[1:] > doubles[:-1])).tolist():
+            a, b = whole[i], whole[i + 1]
+            if way * b < way * a or (a == b and 0 < i < len(times)):
+                what = f"{shortly(b)} s after {shortly(a)} s; times must {order}, from start to end"
+                raise _fail(f"times[{min(i, len(times) - 1)}]", f"given {what}")
         return rounded(start, context), rounded(end, context), SampleTimes.listed(start, times, context)
     if table.end is None:
         raise _fail("end", "missing; it must be given, unless times are")
     end = table.end.fraction(context)
     if end == start:
-        raise _fail(
-            "end", f"given {shortly(end)} s, which is start; a later time, or an earlier one, is allowed"
-        )
+        what = f"given {shortly(end)} s, which is start; a later time, or an earlier one, is allowed"
+        raise _fail("end", what)
     if table.every is not None:
         step = table.every.fraction(context)
-        if not step > 0:
-            raise _fail("every", f"given {shortly(step)} s; a positive time is allowed")
         irrational = any(t is not None and t.pi_power for t in (table.start, table.end, table.every))
         slack = Fraction(1, 2**100) if irrational else 0  # an end on the grid is a sample, rounded or not
         intervals = math.floor(abs(end - start) / step + slack)
-        if intervals > _MOST_SAMPLES:
-            ratio = shortly(abs(end - start) / step, 3)
-            raise _fail("every", f"asks for {ratio} samples; at most 1e12 are allowed")
-        if intervals == 0:
-            raise _fail(
-                "every",
-                f"given {shortly(step)} s, longer than the whole run; at most {shortly(abs(end - start))} s "
-                "is allowed",
-            )
         step = step if end > start else -step
     else:
-        count = table.samples if table.samples is not None else 1001
-        if not 2 <= count <= _MOST_SAMPLES:
-            raise _fail(
-                "samples",
-                f"given {shown(count)}; 2 to 1e12 are allowed (the first at start, the last at end)",
-            )
-        intervals = count - 1
-        step = (end - start) / intervals
+        intervals = 1000 if table.samples is None else table.samples - 1
+        step = (end - start) / (intervals or 1)
+    if not 1 <= intervals < _MOST_SAMPLES:
+        key, count = "samples" if table.every is None else "every", shortly(Fraction(intervals + 1), 8)
+        raise _fail(key, f"makes {count} samples of the run; 2 (at start and end) to 1e12 are allowed")
     samples = SampleTimes(start, step, None, intervals + 1, context)
     return rounded(start, context), rounded(end, context), samples
 

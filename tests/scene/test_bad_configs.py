@@ -114,9 +114,9 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
         ('[states]\nname = "s"', "[[states]]", "write [[states]] in double brackets"),
     ],
     "until 10": [
-        ("samples = 5\nevery = 1", "every", "given with samples"),
-        ("samples = 10_000_000_000_000", "samples", "given 10000000000000; 2 to 1e12"),
-        ("every = 11", "every", "given 11.0 s, longer than the whole run"),
+        ("samples = 5\nevery = 1", "", "given samples and every; give one of them"),
+        ("samples = 10_000_000_000_000", "samples", "makes 1.0e+13 samples"),
+        ("every = 11", "every", "makes 1.0 samples of the run; 2 (at start and end)"),
     ],
     "until 1": [
         ('epoch = "2029-04-13T21:46:00"', "epoch", 'given "2029-04-13T21:46:00", without its time scale'),
@@ -125,7 +125,7 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
     ],
     "time": [
         ("samples = 3", "end", "missing; it must be given, unless times are"),
-        ("times = [1, 2, 2]", "times[2]", "given 2.0 after 2.0; times must increase"),
+        ("times = [1, 2, 2]", "times[2]", "given 2.0 s after 2.0 s; times must increase"),
     ],
     "integrator": [
         ('method = "rk4"', "method", 'given "rk4"', "allowed: taylor"),

@@ -117,8 +117,8 @@ def test_members_go_either_way(tmp_path: Path) -> None:
         ("end = 0\nsamples = 3", "given 0.0 s, which is start"),
         ("end = -1\nevery = -0.1", "a positive time is allowed"),
         ("times = [0, -1, -0.5]", "times must decrease"),
-        ("start = 1\nend = -1\ntimes = [2, 0]", "start (1.0 s) or earlier is allowed"),
-        ("end = -1\nevery = 2", "at most 1.0 s is allowed"),
+        ("start = 1\nend = -1\ntimes = [2, 0]", "given 2.0 s after 1.0 s; times must decrease"),
+        ("end = -1\nevery = 2", "makes 1.0 samples of the run"),
     ],
 )
 def test_times_that_contradict_each_other_are_refused(time: str, words: str) -> None:
