@@ -466,7 +466,7 @@ def message_columns(path: Path, kind: str) -> dict[str, Any]:
     return {
         "columns": {name: np.ascontiguousarray(table[:, n]) for n, name in enumerate(columns)},
         "units": {name: "deg/s" for name in MESSAGE_COLUMNS["angular_velocity"] if name in columns},
-        "counted": segments[0].counted, "first": int(numbers[0]), "lines": numbers,
+        "counted": segments[0].counted, "lines": numbers,
         "epochs": tuple(date for dates in epochs for date in dates),
         "axes": parts[0].axes, "settled": all(part.settled for part in parts),
         "resolution": parts[0].resolution, "notes": tuple(dict.fromkeys(notes)),

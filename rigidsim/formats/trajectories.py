@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib.util
 import itertools
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -50,7 +50,6 @@ class Trajectory:
         units: of columns, as far as the file says so apart from their names.
         source: the file, or what was given in Python.
         counted: what a row is called, "line" of a text, otherwise "row".
-        first: number of the first row, as the file counts them.
         narrow: whether the numbers were single precision.
         epochs: times of a message as dates, in place of a column of times.
         axes: the space axes that a message names; empty where none are named.
@@ -58,7 +57,7 @@ class Trajectory:
         resolution: half the last digits of a message's quaternions and rates, whose numbers were converted.
         left_out: names of columns that hold no real numbers.
         notes: what a user should know of how the file was read.
-        lines: numbers of the rows' lines, where these don't follow each other.
+        lines: numbers of the rows as the file counts them; None: from 0.
         text: the text that the columns are from; cells that are no numbers are read there again.
     """
 
@@ -66,7 +65,6 @@ class Trajectory:
     source: str
     units: Mapping[str, str] = field(default_factory=dict)
     counted: str = "row"
-    first: int = 0
     narrow: bool = False
     epochs: tuple[Epoch, ...] = ()
     axes: str = ""
@@ -79,8 +77,7 @@ class Trajectory:
 
     def row(self, index: int) -> str:
         """A row as the file counts it."""
-        number = self.first + int(index) if self.lines is None else int(self.lines[index])
-        return f"{self.counted} {number}"
+        return f"{self.counted} {int(index if self.lines is None else self.lines[index])}"
 
     @property
     def names(self) -> list[str]:
@@ -120,10 +117,7 @@ class Trajectory:
             RigidsimError: there is no such column, or a row holds no finite number.
         """
         name = self.named(name)
-        found = self.columns.get(name)
-        if found is None:  # of words
-            assert self.text is not None
-            found = np.full(sum(1 for _ in self.text.rows()), np.nan)
+        found = self.columns[name] if name in self.columns else np.full(np.size(self.lines), np.nan)
         bad = np.flatnonzero(~np.isfinite(found))
         if len(bad):
             cells = [] if self.text is None else itertools.islice(self.text.column(name), bad[0], bad[0] + 1)
@@ -259,36 +253,30 @@ def _made(
     """Columns of arrays (or of what is read from a file by slices), each with the labels of its components
     (none: numbers from 0).
     """
-    names: list[str] = []
-    kept, left_out = [], []
+    columns: dict[str, np.ndarray] = {}
+    left_out, narrow = [], False
     for name, value, labels in given:
-        if value.ndim and value.dtype.kind not in "fiu":
-            left_out.append(name)
-        if value.dtype.kind not in "fiu" or not value.ndim:
-            continue
         places = list(itertools.product(*map(range, value.shape[1:])))
-        if len(places) > _MOST_COLUMNS:
+        if not value.ndim or len(places) > _MOST_COLUMNS:
             continue
-        kept.append(value)
+        if value.dtype.kind not in "fiu":
+            left_out.append(name)
+            continue
+        narrow = narrow or value.dtype == np.float32
+        table = np.asarray(value).reshape(len(value), -1).astype(np.float64)
         parts = labels or ["".join(map(str, place)) for place in places]
-        names += [name] if value.ndim == 1 else [f"{name}_{part}" for part in parts]
-    sizes = {len(value) for value in kept}
+        for part, column in zip(parts, table.T, strict=True):
+            columns[name if value.ndim == 1 else f"{name}_{part}"] = column
+    sizes = {len(column) for column in columns.values()}
     if len(sizes) > 1:
         raise RigidsimError(f"{source}: columns of different lengths ({sorted(sizes)[:5]}); give equal ones")
-    columns = [np.asarray(value).reshape(len(value), -1).astype(np.float64) for value in kept]
-    table = np.concatenate(columns, axis=1) if columns else np.empty((0, 0))
-    narrow = any(value.dtype == np.float32 for value in kept)
-    return Trajectory(_columns(names, table), source, units or {}, narrow=narrow, left_out=tuple(left_out))
-
-
-def _columns(names: Sequence[str], table: np.ndarray) -> dict[str, np.ndarray]:
-    return {name: table[:, n] for n, name in enumerate(names)}
+    return Trajectory(columns, source, units or {}, narrow=narrow, left_out=tuple(left_out))
 
 
 def _of_frame(frame: pandas.DataFrame, source: str) -> Trajectory:
     columns = {str(name): frame[name].to_numpy() for name in frame.columns}
     if isinstance(frame.index.name, str) and frame.index.dtype.kind in "fiu":
-        columns = {frame.index.name: frame.index.values, **columns}
+        columns = {frame.index.name: frame.index.to_numpy(), **columns}
     return _made(((name, value, ()) for name, value in columns.items()), source)
 
 
@@ -323,38 +311,26 @@ def _of_xarray_file(path: Path) -> Trajectory:
 def _of_parquet(path: Path) -> Trajectory:
     if importlib.util.find_spec("pyarrow") is None:
         raise RigidsimError(f'{path}: needs pyarrow, which is missing: pip install "rigidsim[export]"')
-    from pyarrow import types
     from pyarrow.parquet import read_table
 
-    table = read_table(path)
-    numbers = [x for x in table.schema if types.is_integer(x.type) or types.is_floating(x.type)]
-    found = {x.name: table[x.name].to_numpy().astype(np.float64) for x in numbers}
-    narrow = any(types.is_float32(column.type) for column in numbers)
-    left_out = tuple(name for name in table.schema.names if name not in found)
-    return Trajectory(found, str(path), narrow=narrow, left_out=left_out)
+    return _of_frame(read_table(path).to_pandas(ignore_metadata=True), str(path))
 
 
 def _of_text(path: Path) -> Trajectory:
     table = open_table(partial(_lines, path))
     lines: list[int] = []
-
     rows, blocks = table.rows(), []
     while block := list(itertools.islice(rows, _BLOCK)):
         lines.extend(number for number, _ in block)
-        try:
-            blocks.append(np.array([[float(cell) for cell in cells] for _, cells in block]))
-        except ValueError:
-            blocks.append(np.array([list(map(table.number, cells)) for _, cells in block]))
+        blocks.append(np.array([list(map(table.number, cells)) for _, cells in block]))
     if not lines:
         raise TableError("no rows; a line of names and rows of values are needed")
-    found = _columns(table.names, np.concatenate(blocks))
+    found = dict(zip(table.names, np.concatenate(blocks).T, strict=True))
     kept = {name: values for name, values in found.items() if np.isfinite(values).any()}
     left_out = tuple(name for name in found if name not in kept)
-    in_turn = lines[-1] - lines[0] == len(lines) - 1
     return Trajectory(
-        kept, str(path), table.units, "line", lines[0], left_out=left_out,
-        lines=None if in_turn else np.array(lines), text=table,
-    )  # fmt: skip
+        kept, str(path), table.units, "line", left_out=left_out, lines=np.array(lines), text=table
+    )
 
 
 def _lines(path: Path) -> Iterator[str]:
