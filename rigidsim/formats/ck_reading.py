@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -28,7 +27,7 @@ from rigidsim.scene.space_axes import from_equator
 SUFFIX = ".bc"
 _TURN = 0.1  # rad from row to row
 _FEWEST, _MOST, _FIRST = 200, 20_000, 50
-_DIGITS = "123"
+_RATE_NAMES = ("wx", "wy", "wz")
 _DIRECTORY = 100  # times for each of which a directory holds one more
 _PACKET = {0: 8, 1: 4, 2: 14, 3: 7}  # numbers of a row of type 5, by its subtype
 _INSTANTS, _RATES, _LINES, _POLYNOMIALS = 1, 2, 3, 5  # types of segments that have rows
@@ -45,7 +44,34 @@ def read_ck(path: Path, kernels: Sequence[Path], ahead: Fraction, begin: float, 
         RigidsimError: SPICE refuses a kernel, or the CK doesn't cover the experiment.
     """
     with _opened(path, kernels, "as --kernels FILE") as (toolkit, number):
-        return _rows(toolkit, path, number, ahead, (begin, end))
+        clock = toolkit.ckmeta(number, "SCLK")
+        window = toolkit.ckcov(str(path), number, False, "INTERVAL", 0.0, "TDB")
+        pieces = [toolkit.wnfetd(window, n) for n in range(toolkit.wncard(window))]
+        first, last = max(pieces, key=lambda piece: piece[1] - piece[0])
+        first, last = max(first, begin + float(ahead)), min(last, end + float(ahead))
+        if not first < last:
+            covered = ", ".join(f"{a - float(ahead):.6g} to {b - float(ahead):.6g} s" for a, b in pieces[:3])
+            raise RigidsimError(
+                f"{path}: covers {covered} in the experiment's time, which is {begin:.6g} to {end:.6g} s; "
+                "check [time] epoch"
+            )
+        inside = (last - first) * 1e-9  # ticks are rounded
+
+        def at(count: int) -> tuple[np.ndarray, list[tuple[Any, Any]]]:
+            dates = np.linspace(first + inside, last - inside, count)
+            return dates, [_pointing(toolkit, number, toolkit.sce2c(clock, date)) for date in dates]
+
+        rates = [np.linalg.norm(rate) for _, rate in at(_FIRST)[1] if rate is not None]
+        turns = max(rates, default=0.0) * (last - first) / _TURN
+        dates, found = at(int(np.clip(turns, _FEWEST, _MOST)) + 1)
+    matrices = np.array([matrix.T for matrix, _ in found])  # SPICE's go from the reference to the body
+    columns = {"t": np.array([float(Fraction(date) - ahead) for date in dates.tolist()])}
+    columns |= {f"r{a}{b}": matrices[:, i, j] for i, a in enumerate("123") for j, b in enumerate("123")}
+    units = {"t": "s"}
+    if rates:
+        columns |= dict(zip(_RATE_NAMES, np.array([rate for _, rate in found]).T, strict=True))
+        units |= dict.fromkeys(_RATE_NAMES, "rad/s")
+    return Trajectory(columns, str(path), units)
 
 
 def read_rows(path: Path, kernels: Sequence[Path], epoch: Epoch, axes: str | None) -> Trajectory:
@@ -115,90 +141,42 @@ def _own_ticks(toolkit: Any, path: Path) -> tuple[np.ndarray, np.ndarray]:
                     "a CSV"
                 )
             values = np.asarray(toolkit.dafgda(handle, first, last), dtype=np.float64)
-            segments.append((_Segment.of(values, kind, rated=bool(rated)), bool(rated)))
+            segments.append((*_segment(values, kind, rated=bool(rated)), bool(rated)))
     finally:
         toolkit.dafcls(handle)
     found = dict[float, bool]()
-    for place, (segment, rated) in enumerate(segments):
-        hidden = np.zeros(len(segment.ticks), dtype=bool)
-        for later, _ in segments[place + 1 :]:
-            hidden |= later.holds(segment.ticks)
-        found |= dict.fromkeys(segment.ticks[~hidden].tolist(), rated)
-    ticks = sorted(found)
-    return np.array(ticks), np.array([found[tick] for tick in ticks], dtype=bool)
+    for place, (ticks, _, _, of_rates) in enumerate(segments):
+        hidden = np.zeros(len(ticks), dtype=bool)
+        for _, begins, ends, _ in segments[place + 1 :]:
+            span = np.searchsorted(begins, ticks, side="right") - 1
+            hidden |= (span >= 0) & (ticks <= ends[span])
+        found |= dict.fromkeys(ticks[~hidden].tolist(), of_rates)
+    every = sorted(found)
+    return np.array(every), np.array([found[tick] for tick in every], dtype=bool)
 
 
-@dataclass(frozen=True)
-class _Segment:
-    """Times of the rows of one segment, and the spans in which SPICE has attitudes by it, all in ticks."""
-
-    ticks: np.ndarray
-    begins: np.ndarray
-    ends: np.ndarray
-
-    def holds(self, ticks: np.ndarray) -> np.ndarray:
-        """Whether SPICE has attitudes of it at these times, (n,) bool."""
-        span = np.searchsorted(self.begins, ticks, side="right") - 1
-        return (span >= 0) & (ticks <= self.ends[span])
-
-    @classmethod
-    def of(cls, values: np.ndarray, kind: int, *, rated: bool) -> _Segment:
-        """A segment by the numbers of its array, (n,) float64."""
-        if kind == _RATES:
-            count = (_DIRECTORY * (len(values) + 1)) // (10 * _DIRECTORY + 1)  # which it doesn't hold itself
-            begins, ends = values[8 * count : 10 * count].reshape(2, count)
-            return cls(begins, begins, ends)
-        count = int(values[-1])
-        row = _PACKET[int(values[-4])] if kind == _POLYNOMIALS else 7 if rated else 4
-        ticks = values[row * count : (row + 1) * count]
-        if kind == _INSTANTS:
-            return cls(ticks, ticks, ticks)
-        after = (row + 1) * count + (count - 1) // _DIRECTORY
-        begins = values[after : after + int(values[-2])]
-        last = np.append(np.searchsorted(ticks, begins[1:]), count) - 1
-        return cls(ticks, begins, ticks[last])
-
-
-def _rows(toolkit: Any, path: Path, number: int, ahead: Fraction, span: tuple[float, float]) -> Trajectory:
-    clock = toolkit.ckmeta(number, "SCLK")
-    window = toolkit.ckcov(str(path), number, False, "INTERVAL", 0.0, "TDB")
-    pieces = [toolkit.wnfetd(window, n) for n in range(toolkit.wncard(window))]
-    first, last = max(pieces, key=lambda piece: piece[1] - piece[0])
-    first, last = max(first, span[0] + float(ahead)), min(last, span[1] + float(ahead))
-    if not first < last:
-        told = ", ".join(f"{a - float(ahead):.6g} to {b - float(ahead):.6g} s" for a, b in pieces[:3])
-        raise RigidsimError(
-            f"{path}: covers {told} in the experiment's time, which is {span[0]:.6g} to {span[1]:.6g} s; "
-            "check [time] epoch"
-        )
-    inside = (last - first) * 1e-9  # ticks are rounded
-
-    def at(dates: np.ndarray) -> list[tuple[Any, Any]]:
-        return [_pointing(toolkit, number, toolkit.sce2c(clock, date)) for date in dates]
-
-    def dates(count: int) -> np.ndarray:
-        return np.linspace(first + inside, last - inside, count)
-
-    rates = [np.linalg.norm(rate) for _, rate in at(dates(_FIRST)) if rate is not None]
-    count = int(np.clip(max(rates, default=0.0) * (last - first) / _TURN, _FEWEST, _MOST)) + 1
-    chosen = dates(count)
-    found = at(chosen)
-    columns = {"t": np.array([float(Fraction(date) - ahead) for date in chosen.tolist()])}
-    matrices = np.array([matrix.T for matrix, _ in found])  # SPICE's go from the reference to the body
-    columns |= {f"r{a}{b}": matrices[:, i, j] for i, a in enumerate(_DIGITS) for j, b in enumerate(_DIGITS)}
-    if rates:
-        turning = np.array([rate for _, rate in found])
-        columns |= {f"w{axis}": turning[:, n] for n, axis in enumerate("xyz")}
-    return Trajectory(
-        columns, str(path), {"t": "s", **({f"w{axis}": "rad/s" for axis in "xyz"} if rates else {})}
-    )
+def _segment(values: np.ndarray, kind: int, *, rated: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times of the rows of one segment, and begins and ends of the spans in which SPICE has attitudes by it,
+    all in ticks, by the numbers of its array.
+    """
+    if kind == _RATES:
+        count = (_DIRECTORY * (len(values) + 1)) // (10 * _DIRECTORY + 1)  # which it doesn't hold itself
+        begins, ends = values[8 * count : 10 * count].reshape(2, count)
+        return begins, begins, ends
+    count = int(values[-1])
+    row = _PACKET[int(values[-4])] if kind == _POLYNOMIALS else 7 if rated else 4
+    ticks = values[row * count : (row + 1) * count]
+    if kind == _INSTANTS:
+        return ticks, ticks, ticks
+    after = (row + 1) * count + (count - 1) // _DIRECTORY
+    begins = values[after : after + int(values[-2])]
+    last = np.append(np.searchsorted(ticks, begins[1:]), count) - 1
+    return ticks, begins, ticks[last]
 
 
 def _pointing(toolkit: Any, number: int, ticks: float) -> tuple[Any, Any]:
     """Matrix from J2000 to the body, and angular velocity in J2000, rad/s; None where it isn't there."""
     try:
-        matrix, rate, _ = toolkit.ckgpav(number, ticks, 0.0, "J2000")
+        return toolkit.ckgpav(number, ticks, 0.0, "J2000")[:2]
     except toolkit.NotFoundError:
-        matrix, _ = toolkit.ckgp(number, ticks, 0.0, "J2000")
-        return matrix, None
-    return matrix, rate
+        return toolkit.ckgp(number, ticks, 0.0, "J2000")[0], None
