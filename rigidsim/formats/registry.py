@@ -91,9 +91,9 @@ class Format:
 
 
 _PLACES = {
-    "csv": ("csv", "FORMAT", "", ""),
-    "parquet": ("parquet", "FORMAT", "pyarrow", "export"),
-    "zarr": ("zarr", "FORMAT", "zarr", "export"),
+    "csv": ("tables", "CSV", "", ""),
+    "parquet": ("tables", "PARQUET", "pyarrow", "export"),
+    "zarr": ("tables", "ZARR", "zarr", "export"),
     "aem": ("ccsds", "AEM", "", ""),
     "oem": ("ccsds", "OEM", "", ""),
     "ck": ("spice", "CK", "spiceypy", "spice"),

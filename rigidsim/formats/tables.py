@@ -1,4 +1,5 @@
-"""A dataset as flat tables, read block by block, from which CSV, Parquet and the CCSDS messages are written.
+"""A dataset as flat tables, read block by block, from which CSV, Parquet and the CCSDS messages are written;
+and as a Zarr store.
 
 A run's first table has a row per sample; each event, and the Lyapunov estimates, have a table of their own. A
 sweep's has a row per member; variables with a dimension besides the members' (the samples of whole series,
@@ -8,19 +9,25 @@ member's number and the values that identify it. A vector becomes a column per c
 """
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from decimal import Decimal
 from functools import cache
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray
 
-from rigidsim.formats.digits import RADIAN, converted
+from rigidsim.formats.digits import RADIAN, converted, texts
+from rigidsim.formats.registry import Format, TableSource, named_epoch
+from rigidsim.scene.epochs import DIGITS, Epoch
 from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.scene.readable import AngleUnit
-from rigidsim.store.sweeps.tiles import boxes
+from rigidsim.store.netcdf import CHUNK_ROWS
+from rigidsim.store.sweeps.tiles import boxes, chunk_shape
 from rigidsim.store.variables import LABELS
 
 BLOCK_NUMBERS = 1 << 21  # 16 MB
@@ -36,32 +43,31 @@ class TableColumn:
 
     Attributes:
         parts: names of the variables whose sum, smallest first, is the exact value; the nearest double first.
-        angle_unit: unit of its angles, with which the column's name ends; None if unchanged.
+        suffix: of the column's name: the component, and the unit of angles where they are converted.
+        kind: of numpy: "f", "i", "M" for dates; "U" for all else.
+        angle_unit: to which its angles are converted; None if unchanged.
     """
 
-    variable: str
+    parts: tuple[str, ...]
     suffix: str
     index: tuple[int, ...]
-    parts: tuple[str, ...]
-    attributes: dict[str, Any]
-    kind: str = "f"
-    angle_unit: AngleUnit | None = None
+    attributes: Mapping[str, Any]
+    kind: str
+    angle_unit: AngleUnit | None
+
+    def part_name(self, part: int) -> str:
+        """Name of a residual's column: ``angular_velocity_lo_x``."""
+        return self.parts[part] + self.suffix
 
     @property
     def name(self) -> str:
         """Name of the column: ``angular_velocity_x``, or ``obliquity_figure_deg``."""
-        return self.variable + self.suffix + self._unit
-
-    @property
-    def _unit(self) -> str:
-        return "" if self.angle_unit is None else f"_{self.angle_unit.name}"
+        return self.part_name(0)
 
     @property
     def units(self) -> str:
         """Units as in the dataset, or those to which angles are converted."""
-        if self.angle_unit is not None:
-            return self.angle_unit.name
-        return str(self.attributes.get("units", "1"))
+        return self.angle_unit.name if self.angle_unit else str(self.attributes.get("units", "1"))
 
     @property
     def flags(self) -> str:
@@ -75,10 +81,6 @@ class TableColumn:
     def bits(self, of_run: int) -> int:
         """Bits of the significand that its digits must show."""
         return int(self.attributes.get("significant_bits", of_run))
-
-    def part_name(self, part: int) -> str:
-        """Name of a residual's column: ``angular_velocity_lo_x``."""
-        return self.parts[part] + self.suffix + self._unit
 
 
 @dataclass(frozen=True)
@@ -112,22 +114,17 @@ class Table:
         return {dim: self.dataset.sizes[dim] for dim in self.members or (self.dim,)}
 
     @property
-    def _each(self) -> int:
-        """Rows per member: 1, or in a long table as many as any member has."""
-        return int(self.dataset.sizes[self.dim]) if self._long else 1
-
-    @property
     def rows(self) -> int:
-        """Largest number of rows: a long table leaves out rows without any number."""
-        return math.prod(self._outer.values()) * self._each
+        """Number of rows, or of members."""
+        return math.prod(self._outer.values())
 
     @property
     def extent(self) -> str:
         """Description of its rows, for the comment at a file's top."""
         if not self.members:
             return f"{self.rows} rows along {self.dim}"
-        told = f"{math.prod(self._outer.values())} members along {', '.join(self.members)}"
-        return f"{told}, each along {self.dim}" if self._long else told
+        words = f"{self.rows} members along {', '.join(self.members)}"
+        return f"{words}, each along {self.dim}" if self._long else words
 
     def column(self, name: str) -> TableColumn | None:
         """The column with the given name; None if there is none."""
@@ -136,7 +133,8 @@ class Table:
     def blocks(self, columns: Sequence[TableColumn] | None = None) -> Iterator[list[list[np.ndarray]]]:
         """Parts of each column, block by block: ``block[column][part]`` has shape (rows of the block,)."""
         wanted = self.columns if columns is None else columns
-        numbers, each, outer = sum(len(c.parts) for c in self.columns), self._each, self._outer
+        numbers, outer = sum(len(c.parts) for c in self.columns), self._outer
+        each = int(self.dataset.sizes[self.dim]) if self._long else 1  # rows per member
         for first, shape, flat in boxes(list(outer.values()), each * numbers, self.block_numbers):
             width = each if len(flat) > 1 else min(each, max(1, self.block_numbers // numbers))
             for low in range(0, each, width):
@@ -249,12 +247,200 @@ def _columns_of(
     parts = tuple(parts_in(dataset, name))
     unit = angle_unit if variable.attrs.get("units") == RADIAN else None
     kind = variable.dtype.kind if variable.dtype.kind in "fMi" else "U"
+    ending = "" if unit is None else f"_{unit.name}"
     labels = []
     for dim in beside:
         own = [str(x) for x in dataset[dim].values] if dim in dataset.coords else None
         labels.append(LABELS.get(dim) or own or [str(n) for n in range(variable.sizes[dim])])
     found = []
     for index in product(*(range(len(names)) for names in labels)):
-        suffix = "".join(f"_{names[i]}" for names, i in zip(labels, index, strict=True))
-        found.append(TableColumn(name, suffix, index, parts, dict(variable.attrs), kind, unit))
+        suffix = "".join(f"_{names[i]}" for names, i in zip(labels, index, strict=True)) + ending
+        found.append(TableColumn(parts, suffix, index, variable.attrs, kind, unit))
     return found
+
+
+# --- CSV ----------------------------------------------------------------------------------------------------
+
+
+def write_csv(table: Table, path: Path, source: TableSource) -> None:
+    """Write one table with all digits: comment lines, one header line, then decimal text.
+
+        pandas.read_csv(path, comment="#", float_precision="round_trip")
+
+    reads it as float64 (which rounds numbers beyond double to the nearest one); ``dtype=str`` keeps every
+    digit.
+    """
+    columns = [column for column in table.columns if column.kind != "M"]
+    dates = _dates(table, source)
+    wide = any(len(column.parts) > 1 for column in columns if "significant_bits" not in column.attributes)
+    head = [
+        f"# {_short(source.title)}: {table.extent}",
+        'read with pandas.read_csv(path, comment="#", float_precision="round_trip")',
+        "units: " + ", ".join(f"{c.name} [{c.units}]" for c in columns if c.kind != "U"),
+        *(f"{column.name}: {column.flags}" for column in columns if column.flags),
+    ]
+    swept = {c.parts[0]: c.attributes["swept_key"] for c in columns if "swept_key" in c.attributes}
+    if swept:
+        head.append("axes: " + ", ".join(f"{name} is {_short(key)}" for name, key in swept.items()))
+    if wide:
+        head.insert(2, f"numbers have {source.bits} bits; dtype=str keeps the digits that float64 can't hold")
+    names = [column.name for column in columns]
+    if dates is not None:
+        epoch, dated = dates
+        head.append(f"time 0 is {epoch}; dates are {epoch.scale}, to 1e-{DIGITS} s")
+        names.insert(1, f"{dated.parts[0].removesuffix('time')}date")
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write("\n# ".join(head) + "\n")
+        file.write(",".join(names) + "\n")
+        for block in table.blocks(columns):
+            shown = [_shown(c, parts, source) for c, parts in zip(columns, block, strict=True)]
+            if dates is not None:
+                shown.insert(1, [_date(epoch, time) for time in shown[columns.index(dated)]])
+            file.writelines(",".join(row) + "\n" for row in zip(*shown, strict=True))
+
+
+def _shown(column: TableColumn, parts: list[np.ndarray], source: TableSource) -> list[str]:
+    """One column's numbers, or its strings in quotes."""
+    if column.kind == "U":
+        return [f'"{_on_one_line(text).replace(chr(34), chr(34) * 2)}"' for text in parts[0]]
+    return texts(parts, column.bits(source.bits))
+
+
+def _dates(table: Table, source: TableSource) -> tuple[Epoch, TableColumn] | None:
+    """Date of time 0 and the column of times, if known and the calendar covers all rows; else None."""
+    if table.members:  # datasets of sweeps hold no dates
+        return None
+    times = next((c for c in table.columns if re.fullmatch(r"(.*_)?time", c.parts[0])), None)
+    if times is None or not table.rows or not (source.naming.epoch or source.attributes.get("epoch")):
+        return None
+    epoch = named_epoch(source.naming, source.attributes)
+    try:
+        for row in (0, -1):
+            _date(epoch, repr(float(table.dataset[times.parts[0]][row])))
+    except (ValueError, ArithmeticError):
+        return None
+    return epoch, times
+
+
+def _date(epoch: Epoch, seconds: str) -> str:
+    return epoch.after(Decimal(seconds)).calendar()
+
+
+def _short(text: str) -> str:
+    """Text on a single line of limited length."""
+    return _on_one_line(text)[:200]
+
+
+def _on_one_line(text: str) -> str:
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
+# --- Parquet ------------------------------------------------------------------------------------------------
+
+
+def write_parquet(table: Table, path: Path, source: TableSource) -> None:
+    """Write one table as float64 columns, with units in each column's metadata; residuals become columns
+    such as ``time_lo``.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    kinds = {"f": pa.float64(), "i": pa.int64(), "M": pa.timestamp("ns"), "U": pa.string()}
+    fields = []
+    for column in table.columns:
+        for part in range(len(column.parts)):
+            about = {"units": column.units, "long_name": str(column.attributes.get("long_name", ""))}
+            if part:
+                about["residual_of"] = column.name
+            elif column.flags:
+                about["flags"] = column.flags
+            elif "exact_value" in column.attributes:
+                about["exact_value"] = " + ".join(
+                    column.part_name(n) for n in reversed(range(len(column.parts)))
+                )
+            kind = kinds[column.kind]
+            fields.append(pa.field(column.part_name(part), kind, nullable=column.kind == "M", metadata=about))
+    schema = pa.schema(fields, metadata={str(key): str(value) for key, value in source.attributes.items()})
+    with pq.ParquetWriter(path, schema, compression="zstd", use_dictionary=False) as writer:
+        for block in table.blocks():
+            arrays = [pa.array(part) for parts in block for part in parts]
+            writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
+
+
+# --- Zarr ---------------------------------------------------------------------------------------------------
+
+BLOCK_ROWS = 8 * CHUNK_ROWS
+_SLAB_BLOCKS = 8  # 128 MB at once: each is an append
+
+
+def write_zarr(table: Table, path: Path, source: TableSource) -> None:
+    """Write a table's whole dataset as a store of format 2, which every reader knows, block by block along
+    time or a sweep's first axis: unchanged, including residuals and labels.
+    """
+    dataset = table.dataset
+    attributes = {str(key): _json(value) for key, value in source.attributes.items()}
+    members = table.members
+    dim = members[0] if members else table.dim
+    rows = _slab(table) if members else BLOCK_ROWS
+    along = dataset[[name for name in dataset.variables if dim in dataset[name].dims]]
+    for first in range(0, max(dataset.sizes[dim], 1), rows):
+        block = _plain(along.isel({dim: slice(first, first + rows)}), source)
+        if first:
+            block = block.drop_vars([name for name in block.variables if dim not in block[name].dims])
+            block.to_zarr(path, mode="a", append_dim=dim, zarr_format=2, consolidated=False)
+        else:
+            block.attrs = attributes
+            chunks = {name: {"chunks": _chunks(dataset[name], members)} for name in block.variables
+                      if dim in block[name].dims}  # fmt: skip
+            block.to_zarr(path, mode="w", encoding=chunks, zarr_format=2, consolidated=False)
+    rest = [name for name in dataset.variables if dim not in dataset[name].dims]
+    last = _plain(dataset[rest], source)
+    last.attrs = attributes
+    if members:  # no variable that is written beside a vector's components tells that they are a coordinate
+        last = last.reset_coords()
+        beside = [str(name) for name in dataset.coords if name not in dataset.dims]
+        last.attrs = attributes | ({"coordinates": " ".join(beside)} if beside else {})
+    last.to_zarr(path, mode="a", zarr_format=2, consolidated=True)
+
+
+def _plain(dataset: xarray.Dataset, source: TableSource) -> xarray.Dataset:
+    """The dataset in memory, with angles in the requested unit, without the HDF5 file's own encodings."""
+    loaded = dataset.load().copy()
+    for name in map(str, dataset.variables):
+        angles = dataset[name].attrs.get("units") == RADIAN and "residual_of" not in dataset[name].attrs
+        if source.angle_unit is not None and angles:
+            names = parts_in(dataset, name)
+            values = converted([dataset[part].values for part in names], source.angle_unit, source.bits)
+            for part, found in zip(names, values, strict=True):
+                about = dict(dataset[part].attrs, units=source.angle_unit.name)
+                loaded = loaded.assign({part: (dataset[part].dims, found, about)})
+    for name in loaded.variables:
+        kept = ("units", "calendar", "dtype") if loaded[name].dtype.kind == "M" else ()
+        loaded[name].encoding = {key: loaded[name].encoding[key] for key in kept}
+        loaded[name].attrs = {key: _json(value) for key, value in loaded[name].attrs.items()}
+    loaded.encoding = {}
+    return loaded
+
+
+def _chunks(variable: xarray.DataArray, members: Sequence[str]) -> tuple[int, ...]:
+    """Chunk shape: rows along time; for a sweep, members as in its dataset."""
+    if not members:
+        return (CHUNK_ROWS, *variable.shape[1:])
+    of_members = len([dim for dim in variable.dims if dim in members])
+    return chunk_shape(variable.shape[:of_members], variable.shape[of_members:])
+
+
+def _slab(table: Table) -> int:
+    """Values of the first axis whose members are held in memory at once."""
+    dataset, first = table.dataset, table.members[0]
+    numbers = sum(found.size for found in dataset.variables.values() if first in found.dims)
+    return max(1, _SLAB_BLOCKS * table.block_numbers * dataset.sizes[first] // max(numbers, 1))
+
+
+def _json(value: Any) -> Any:
+    return value.item() if hasattr(value, "item") and getattr(value, "ndim", 1) == 0 else value
+
+
+CSV = Format(write_csv, angles=True, side_tables=True, names=("epoch",))
+PARQUET = Format(write_parquet, angles=True, side_tables=True, names=())
+ZARR = Format(write_zarr, angles=True, names=(), folder=("Zarr store", ".zgroup"))

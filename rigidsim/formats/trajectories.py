@@ -117,7 +117,8 @@ class Trajectory:
             RigidsimError: there is no such column, or a row holds no finite number.
         """
         name = self.named(name)
-        found = self.columns[name] if name in self.columns else np.full(np.size(self.lines), np.nan)
+        rows = 0 if self.lines is None else len(self.lines)
+        found = self.columns.get(name, np.full(rows, np.nan))  # of words where it is none of them
         bad = np.flatnonzero(~np.isfinite(found))
         if len(bad):
             cells = [] if self.text is None else itertools.islice(self.text.column(name), bad[0], bad[0] + 1)
