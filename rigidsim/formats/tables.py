@@ -414,7 +414,7 @@ def _plain(dataset: xarray.Dataset, source: TableSource) -> xarray.Dataset:
             for part, found in zip(names, values, strict=True):
                 about = dict(dataset[part].attrs, units=source.angle_unit.name)
                 loaded = loaded.assign({part: (dataset[part].dims, found, about)})
-    for name in loaded.variables:
+    for name in map(str, loaded.variables):
         kept = ("units", "calendar", "dtype") if loaded[name].dtype.kind == "M" else ()
         loaded[name].encoding = {key: loaded[name].encoding[key] for key in kept}
         loaded[name].attrs = {key: _json(value) for key, value in loaded[name].attrs.items()}
