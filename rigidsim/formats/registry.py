@@ -5,15 +5,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rigidsim.errors import RigidsimError
 from rigidsim.formats import FORMATS
 from rigidsim.scene.epochs import Epoch, parse_epoch
 from rigidsim.scene.readable import AngleUnit
-
-if TYPE_CHECKING:
-    from rigidsim.formats.tables import Table
 
 
 @dataclass(frozen=True)
@@ -70,7 +67,7 @@ class Format:
     """A format of another tool.
 
     Attributes:
-        write: writes a table to a path that doesn't exist yet.
+        write: writes a ``Table`` to a path that doesn't exist yet.
         angles: whether it takes angles in any unit.
         side_tables: whether tables along other dimensions than time get files of their own.
         suffix: of its files; by default the format's name.
@@ -80,12 +77,12 @@ class Format:
         folder: what such a folder is called, and a file that identifies one; None if it writes a file.
     """
 
-    write: "Callable[[Table, Path, TableSource], None]"
+    write: Callable[[Any, Path, TableSource], None]
     angles: bool = False
     side_tables: bool = False
     folder: tuple[str, str] | None = None
     suffix: str = ""
-    beside: "Mapping[str, Callable[[Table, Path, TableSource], None]]" = field(default_factory=dict)
+    beside: Mapping[str, Callable[[Any, Path, TableSource], None]] = field(default_factory=dict)
     between: bool = False
     names: tuple[str, ...] = ("epoch", "axes", "object_name", "object_id", "center")
 
