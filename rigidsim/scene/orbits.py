@@ -162,7 +162,7 @@ def resolve_orbit(table: Elements, strength: Any | None, around: Setting) -> Kep
     )
 
 
-@lru_cache(8)
+@lru_cache(64)  # loads of a scene with one table have one orbit
 def tabulated_orbit(
     name: str,
     text: str,
@@ -192,8 +192,7 @@ def tabulated_orbit(
         mass = context.make_mpf(strength)
         motion = lambda axis: context.sqrt(mass / axis**3)  # noqa: E731
     columns = {key: value.at(context) for key, value in given.items()}
-    made_of = (name, text, bits, constants, strength, opposite)
-    orbit = TabulatedOrbit(made_of, name, table, columns, motion, opposite=opposite)
+    orbit = TabulatedOrbit(name, table, columns, motion, opposite=opposite)
     _ = orbit.error
     return orbit
 

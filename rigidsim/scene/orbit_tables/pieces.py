@@ -38,14 +38,13 @@ _LARGEST_TILT = 0.9999  # of sin(i/2): 178.4 deg
 
 
 class TabulatedOrbit:
-    """An orbit with elements over time; numbers are mpf of the scene's precision, SI. Orbits with equal keys,
-    everything they are made from, are the same; ``motion`` goes from the semi-major axis to the mean motion.
-    The elements are the table's, or with ``opposite`` those of the other body: half a turn on in its plane.
+    """An orbit with elements over time; numbers are mpf of the scene's precision, SI. ``motion`` is of the
+    semi-major axis, the mean motion. The elements are the table's, or with ``opposite`` those of the other
+    body: half a turn on in its plane.
     """
 
     def __init__(
         self,
-        key: Any,
         name: str,
         table: ElementTable,
         constants: Mapping[str, Any],
@@ -53,7 +52,7 @@ class TabulatedOrbit:
         *,
         opposite: bool = False,
     ) -> None:
-        self.key, self.name, self.table, self.motion = key, name, table, motion
+        self.name, self.table, self.motion = name, table, motion
         self.context = table.context
         self._constants = constants
         self.opposite, self._half_turn = opposite, self.context.pi if opposite else self.context.zero
@@ -64,12 +63,6 @@ class TabulatedOrbit:
         columns = np.array([self._rows[name] for name in moving], dtype=object).T
         self._interpolation = Interpolation(np.diff(np.array(table.times, dtype=object)), columns)
         self._pieces: dict[int, dict[str, list[Any]]] = {}
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, TabulatedOrbit) and self.key == other.key
-
-    def __hash__(self) -> int:
-        return hash(self.key)
 
     # --- rows -----------------------------------------------------------------------------------------------
 
