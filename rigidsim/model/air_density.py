@@ -16,11 +16,10 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.flight_names import flown_about
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load_words import length_text, value_text
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.sources import read_in
+from rigidsim.model.sources import flown_about, read_in
 from rigidsim.model.two_part import rounded
 from rigidsim.scene.arithmetic import apply
 from rigidsim.scene.bodies.presets import EARTH

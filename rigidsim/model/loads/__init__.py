@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rigidsim.model import flight_names, shadows  # noqa: F401  (names in expressions)
+from rigidsim.model import sources  # noqa: F401  (names in expressions)
 from rigidsim.model.load import Load, Term
 from rigidsim.model.loads import (  # noqa: F401  (each enters its kind; a new load is one line more here)
     applied,

@@ -30,7 +30,6 @@ import heyoka as hy
 from pydantic import Field, StrictBool
 
 from rigidsim.model.air_density import AIR_DENSITY, INDICES, LEAST, NRLMSISE, height
-from rigidsim.model.flight_names import RELATIVE_NAMES, flown_about
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term, loads_of
 from rigidsim.model.loads.applied import Applied
@@ -38,6 +37,7 @@ from rigidsim.model.loads.attraction import Attraction
 from rigidsim.model.names import written
 from rigidsim.model.plausibility import about_altitude
 from rigidsim.model.rotations import Symbolic, apply
+from rigidsim.model.sources import RELATIVE_NAMES, flown_about
 from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm
 from rigidsim.scene.bodies.outside import OuterSurface, Plate
 from rigidsim.scene.bodies.presets import known_body

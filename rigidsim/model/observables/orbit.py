@@ -18,12 +18,12 @@ from collections.abc import Callable, Mapping
 
 import heyoka as hy
 
-from rigidsim.model.flight_names import RELATIVE_NAMES, FlightNames, flown_about
 from rigidsim.model.frames import local_frame, moves_slowly_in_orbit
 from rigidsim.model.loads.surface_load import Drag
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import BODY, Angle, Observable, continuous_angles, register_all
 from rigidsim.model.rotations import Symbolic, along
+from rigidsim.model.sources import RELATIVE_NAMES, FlightNames, flown_about
 from rigidsim.scene.frame import unique_axis
 
 
