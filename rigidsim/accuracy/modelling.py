@@ -34,7 +34,7 @@ from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, prepare_scene
 from rigidsim.solve.status import Status
 from rigidsim.solve.tangents import Derivatives, LostTangents, Place, Tangents
-from rigidsim.store.summary_parts import Modelling, ModellingWindow, UnmeasuredCode
+from rigidsim.store.summary import Modelling, ModellingWindow, UnmeasuredCode
 
 
 class Unmeasured(Exception):

@@ -23,8 +23,7 @@ from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import LATE
 from rigidsim.solve.status import Status
 from rigidsim.store import provenance
-from rigidsim.store.summary import Summary
-from rigidsim.store.summary_parts import EventTimes
+from rigidsim.store.summary import EventTimes, Summary
 from rigidsim.store.variables import LABELS, OF_THE_RUN, SCHEMA_VERSION, Extra, Variable, time_variable
 
 if TYPE_CHECKING:

@@ -51,8 +51,7 @@ from rigidsim.store.folder import RunFolder
 from rigidsim.store.provenance import repeated
 from rigidsim.store.run import MemoryRun, MemoryWriter, Run, SavedRun
 from rigidsim.store.segments import Arrays, Chain, SegmentWriter
-from rigidsim.store.summary import Summary, as_fields
-from rigidsim.store.summary_parts import (
+from rigidsim.store.summary import (
     Accuracy,
     Advice,
     AdviceCode,
@@ -62,8 +61,10 @@ from rigidsim.store.summary_parts import (
     InvariantDrift,
     Lyapunov,
     Modelling,
+    Summary,
     TableErrors,
     UnmeasuredCode,
+    as_fields,
 )
 from rigidsim.store.variables import Extra
 

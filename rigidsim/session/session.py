@@ -37,7 +37,7 @@ from rigidsim.store import netcdf
 from rigidsim.store.netcdf import CHUNK_ROWS
 from rigidsim.store.run import MemoryWriter
 from rigidsim.store.segments import Chain, SegmentLimits, SegmentWriter
-from rigidsim.store.summary_parts import ENGINE
+from rigidsim.store.summary import ENGINE
 
 if TYPE_CHECKING:
     from rigidsim.session.sensitivity import Sensitivity

@@ -28,8 +28,7 @@ from rigidsim.scene.suspicions import (
 )
 from rigidsim.scene.tracing.numbers import plain
 from rigidsim.solve.problem import InitialValueProblem
-from rigidsim.store.summary import Span, Start, UnderstoodBody
-from rigidsim.store.summary_parts import Three
+from rigidsim.store.summary import Span, Start, Three, UnderstoodBody
 
 _DIGITS = 6
 _PLAIN = ("0", "False", "True")

@@ -16,8 +16,7 @@ from rigidsim.look.figure_names import FIGURES
 from rigidsim.scene.kernels.reading import NOTE
 from rigidsim.store import atomic, provenance, segments
 from rigidsim.store.outputs import ANALYSIS
-from rigidsim.store.summary import Brief, read_summary
-from rigidsim.store.summary_parts import SummaryPart
+from rigidsim.store.summary import Brief, SummaryPart, read_summary
 
 _REOPENED = ".segments.reopened"
 

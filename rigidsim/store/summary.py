@@ -5,34 +5,294 @@ A field that isn't given isn't written.
 
 import json
 from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import Field, StrictBool, StrictInt, StrictStr, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    StrictBool,
+    StrictInt,
+    StrictStr,
+    ValidationError,
+    field_validator,
+)
 
 from rigidsim.errors import RunFolderError, run_again
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.choices import DEFAULT_METHOD
-from rigidsim.store.summary_parts import (
-    Accuracy,
-    Advice,
-    BitForBit,
-    ChartChanges,
-    Claim,
-    Cost,
-    Digest,
-    EventTimes,
-    FiniteNumber,
-    Four,
-    InvariantDrift,
-    Lyapunov,
-    Modelling,
-    SummaryPart,
-    TableErrors,
-    Text,
-    Three,
-    first_of,
-)
+
+FiniteNumber = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Text = Annotated[StrictStr, Field(max_length=20_000)]
+Three = tuple[FiniteNumber, FiniteNumber, FiniteNumber]
+Four = tuple[FiniteNumber, FiniteNumber, FiniteNumber, FiniteNumber]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Marks a field that follows from the config alone, so that running it again must confirm it.
+
+    ``of_end``: whether it tells how the run ended, which an interruption changes.
+    """
+
+    of_end: bool = False
+
+
+class SummaryPart(BaseModel):
+    """Immutable part of a summary; unknown fields, written by a newer version, are kept."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, ser_json_inf_nan="constants", defer_build=True)
+
+    def having(self, **known: Any) -> Self:
+        """A copy with the given fields set, validated as on reading."""
+        given = {name: value for name, value in self if name in self.model_fields_set}
+        return type(self).model_validate({**given, **known})
+
+    def as_dict(self) -> dict[str, Any]:
+        """Fields for JSON, without those that weren't given."""
+        return self.model_dump(mode="json", exclude_unset=True)
+
+
+def first_of(error: ValidationError) -> str:
+    """The first thing that is wrong, and where."""
+    first = error.errors(include_url=False)[0]
+    return f"{'.'.join(str(step)[:40] for step in first['loc'])!a}: {first['msg']}"
+
+
+ENGINE = "engine"
+"""Key beside the phases in ``Cost.seconds``: time that the engine alone took of integrating and recording."""
+
+
+class UnmeasuredCode(Enum):
+    """Why the error of an averaged model isn't known; ``value`` stands in summaries."""
+
+    NOT_ASKED = "not_asked"
+    NOT_ENDED = "not_ended"
+    INTERRUPTED = "interrupted"
+    FULL_REFUSED = "full_refused"
+    FULL_STOPPED = "full_stopped"
+    AVERAGED_REFUSED = "averaged_refused"
+    AVERAGED_STOPPED = "averaged_stopped"
+
+
+class AdviceCode(Enum):
+    """Which setting would do better nearly free; ``value`` stands in summaries; a method's is its name."""
+
+    HOLD_INVARIANTS = "hold_invariants"
+    CLOSED_FORM = "closed_form"
+    AVERAGED = "averaged"
+
+
+Digest = Annotated[StrictStr, Field(pattern=r"^[0-9a-f]{64}$")]
+
+
+class Cost(SummaryPart):
+    """What a run cost: CPU and wall seconds of all sessions, and of this one by phase.
+
+    Attributes:
+        smallest_step, largest_step: seconds; None if no step was taken, or none was finite.
+    """
+
+    steps: Annotated[StrictInt, Claim()]
+    steps_redone: StrictInt
+    smallest_step: FiniteNumber | None
+    largest_step: FiniteNumber | None
+    seconds: dict[Text, FiniteNumber]
+    cpu_seconds: FiniteNumber
+    cpu_by_phase: dict[Text, FiniteNumber] = Field(default_factory=dict)
+    sessions: StrictInt = 1
+    wall_seconds: FiniteNumber | None = None
+
+    @field_validator("seconds")
+    @classmethod
+    def _has_engine(cls, seconds: dict[str, float]) -> dict[str, float]:
+        if ENGINE not in seconds:
+            raise ValueError(f'"{ENGINE}" is missing')
+        return seconds
+
+
+class InvariantDrift(SummaryPart):
+    """How well an invariant was kept.
+
+    Attributes:
+        scale: size that drifts are relative to, in ``units``.
+        largest_drift, final_drift: relative drifts; None without samples, or if one isn't finite.
+        bound: relative drift that rounding alone explains.
+        put_back: for a projected invariant, the drift that would have been.
+    """
+
+    initial: Annotated[FiniteNumber | tuple[FiniteNumber, ...] | None, Claim()]
+    units: Annotated[Text, Claim()]
+    scale: Annotated[FiniteNumber, Claim()]
+    scale_name: Annotated[Text, Claim()]
+    largest_drift: Annotated[FiniteNumber | None, Claim()]
+    final_drift: Annotated[FiniteNumber | None, Claim()]
+    bound: Annotated[FiniteNumber, Claim()]
+    put_back: Annotated[FiniteNumber | None, Claim()] = None
+    why: Annotated[Text, Claim()]
+    numerical: Annotated[StrictBool, Claim()]
+
+
+class Accuracy(SummaryPart):
+    """Attitude error at the end, rad: requested, estimated, and certified against a reference.
+
+    Attributes:
+        estimated_position_error, estimated_velocity_error: at the end, m and m/s.
+        amplification: factor by which the motion amplifies rounding errors; None if not estimated.
+        error_growth_rate: 1/s; 0 where errors don't grow exponentially.
+        predictable_seconds: time from the start after which no digit is left; None if never.
+        examined_share: share of the run over which error growth was followed without a gap from its start; 1
+            for all of it.
+    """
+
+    requested: FiniteNumber | None
+    requested_position: FiniteNumber | None = None
+    certified_position: FiniteNumber | None = None
+    estimated_attitude_error: FiniteNumber | None
+    estimated_position_error: FiniteNumber | None = None
+    estimated_velocity_error: FiniteNumber | None = None
+    estimated_how: Text
+    amplification: FiniteNumber | None = 1.0
+    error_growth_rate: FiniteNumber | None = None
+    predictable_seconds: FiniteNumber | None = None
+    amplification_seconds: FiniteNumber | None = None
+    examined_share: FiniteNumber | None = None
+    amplification_how: Text = ""
+    certified: FiniteNumber | None
+    how: Text
+    difference_at_end: FiniteNumber | None = None
+    times_compared: StrictInt = 0
+    chosen: Text = ""
+    chosen_why: Text = ""
+    forecast: FiniteNumber | None = None
+
+
+class TableErrors(SummaryPart):
+    """Interpolation errors between the rows of an orbit's table.
+
+    Attributes:
+        direction, distance: largest errors with every other row left out, rad and relative.
+        expected: factor by which both shrink with all rows present, if the rows follow smooth functions.
+    """
+
+    direction: FiniteNumber
+    distance: FiniteNumber
+    expected: FiniteNumber
+
+
+class ModellingWindow(SummaryPart):
+    """A window in which the full model ran beside a reduced one; see ``rigidsim.accuracy.modelling``.
+
+    Attributes:
+        momentum_axis, figure_axis: largest distances between both models' directions, with what averaging
+            removed added back, rad; None if the figure axis has no mean direction.
+        growth_along, growth_across, doubt: growth of the former along and across the precession, and its
+            difference between the window's parts, rad/s.
+    """
+
+    start: FiniteNumber
+    end: FiniteNumber
+    steps: StrictInt
+    momentum_axis: FiniteNumber
+    figure_axis: FiniteNumber | None
+    growth_along: FiniteNumber
+    growth_across: FiniteNumber
+    doubt: FiniteNumber
+
+
+class Modelling(SummaryPart):
+    """Error of a reduced model against the full one, apart from numerical errors.
+
+    Attributes:
+        short_period: whether what averaging removed is added back in what is recorded.
+        resonance: spin-orbit resonance whose angle is kept, such as "3:2"; empty for none.
+        momentum_axis, figure_axis: largest distances of the directions recorded from the full model's, until
+            the end of the run, rad; None if not measured, or if the figure axis has no mean direction.
+        angular_momentum_norm, energy: largest errors of the momentum's size and the energy of rotation,
+            relative to their values; None where averaging keeps them.
+        growth, oscillation: secular growth of the distance, rad/s, and its oscillating part, rad.
+        requested: largest error that was asked for, rad.
+        unmeasured: an ``UnmeasuredCode``, why it wasn't found; empty where it was.
+    """
+
+    level: Annotated[Text, Claim()]
+    short_period: Annotated[StrictBool, Claim()]
+    resonance: Text = ""
+    momentum_axis: FiniteNumber | None = None
+    figure_axis: FiniteNumber | None = None
+    angular_momentum_norm: FiniteNumber | None = None
+    energy: FiniteNumber | None = None
+    growth: FiniteNumber | None = None
+    oscillation: FiniteNumber | None = None
+    whole: StrictBool = False
+    requested: Annotated[FiniteNumber | None, Claim()] = None
+    how: Text = ""
+    unmeasured: Text = ""
+    cpu_seconds: FiniteNumber | None = None
+    windows: tuple[ModellingWindow, ...] = ()
+
+    @property
+    def worst(self) -> float | None:
+        """The larger of both directions' errors, rad; None if not measured."""
+        known = [x for x in (self.momentum_axis, self.figure_axis) if x is not None]
+        return max(known, default=None)
+
+
+class Lyapunov(SummaryPart):
+    """The motion's Lyapunov spectrum, 1/s, and what it implies for the run's digits."""
+
+    chaotic: Annotated[StrictBool, Claim()]
+    largest_exponent: Annotated[FiniteNumber, Claim()]
+    moved_over_second_half: Annotated[FiniteNumber, Claim()]
+    e_folding_seconds: FiniteNumber | None = None
+    predictable_seconds: FiniteNumber | None = None
+    exponents: Annotated[tuple[FiniteNumber, ...], Claim()] = ()
+    states: tuple[Text, ...] = ()
+    units: Text = "s-1"
+
+
+class EventTimes(SummaryPart):
+    """Times at which an event happened, s: the first, at most ``EARLY`` of the first ones, and the last."""
+
+    EARLY: ClassVar[int] = 5
+    first: Annotated[FiniteNumber, Claim()]
+    last: Annotated[FiniteNumber, Claim()]
+    early: Annotated[tuple[FiniteNumber, ...], Claim()] = ()
+
+
+class Advice(SummaryPart):
+    """A setting that would do better.
+
+    Attributes:
+        now, then: attitude error at the end (of an averaged model, error of the recorded axes) as it is, and
+            as it would be, rad.
+        share: largest share of the steps that it would take; None if unchanged.
+    """
+
+    code: Text
+    now: FiniteNumber
+    then: FiniteNumber
+    level: Text = ""
+    share: FiniteNumber | None = None
+
+
+class ChartChanges(SummaryPart):
+    """How often a run in Euler angles changed from its sequence to the partner or back."""
+
+    count: StrictInt
+    sequence: Text
+    partner: Text
+
+
+class BitForBit(SummaryPart):
+    """Whether repeating the run gives the same bits, and on what condition."""
+
+    claim: StrictBool
+    holds_for: StrictStr
+
 
 _LARGEST_FILE = 16_000_000  # bytes; a summary has some kilobytes
 

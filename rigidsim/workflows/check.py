@@ -10,8 +10,7 @@ from rigidsim.scene.sweep import Sweep
 from rigidsim.session.dataset import refuse_taken_names
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, told_loads
 from rigidsim.solve.problem import prepare
-from rigidsim.store.summary import Span, Start, UnderstoodBody, as_fields
-from rigidsim.store.summary_parts import SummaryPart
+from rigidsim.store.summary import Span, Start, SummaryPart, UnderstoodBody, as_fields
 from rigidsim.workflows.read import load
 from rigidsim.workflows.sweeps.members import recording
 from rigidsim.workflows.sweeps.plan import QUICK, check_sweep
@@ -42,7 +41,7 @@ def check(path: str | Path, *, overrides: Sequence[str] = ()) -> Checked:
             refuse_taken_names(prepared)
         else:
             found = recording(Sweep.of(experiment))
-            prepared = check_sweep(found, every=found.count <= QUICK)
+            prepared = check_sweep(found, most=QUICK)
     except ConfigError as error:
         unknown: dict[str, Any] = dict.fromkeys(("body", "start", "time"))
         given = error.source or str(path)

@@ -25,8 +25,7 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.projection import LATE
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.store.segments import SegmentLimits
-from rigidsim.store.summary import Span, Start, UnderstoodBody
-from rigidsim.store.summary_parts import SummaryPart
+from rigidsim.store.summary import Span, Start, SummaryPart, UnderstoodBody
 from rigidsim.workflows.plan_levels import LevelCost, compared_levels, timed_pilot, torques_change_pace
 from rigidsim.workflows.read import Given, as_experiment
 

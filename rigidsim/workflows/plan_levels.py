@@ -16,7 +16,7 @@ from rigidsim.scene.config import Experiment
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.problem import InitialValueProblem, prepare
-from rigidsim.store.summary_parts import SummaryPart
+from rigidsim.store.summary import SummaryPart
 
 _PILOT_SECONDS = 0.2
 _LARGEST_CHUNK = 1024  # steps: at this length a call's overhead is negligible

@@ -21,8 +21,7 @@ from rigidsim.solve.status import Status
 from rigidsim.store.folder import RunFolder
 from rigidsim.store.outputs import refuse_inputs
 from rigidsim.store.run import MemoryRun, Run, SavedRun
-from rigidsim.store.summary import Summary
-from rigidsim.store.summary_parts import ENGINE
+from rigidsim.store.summary import ENGINE, Summary
 from rigidsim.workflows.read import Experiment, Given, as_experiment
 
 AnyRun = TypeVar("AnyRun", bound=Run)

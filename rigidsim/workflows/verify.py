@@ -22,8 +22,7 @@ from rigidsim.store.provenance import SETTING, changed, platform_of, read_attrib
 from rigidsim.store.reader import open_dataset
 from rigidsim.store.run import Run, open_run
 from rigidsim.store.seal import check_seal
-from rigidsim.store.summary import Brief, Summary
-from rigidsim.store.summary_parts import Claim
+from rigidsim.store.summary import Brief, Claim, Summary
 from rigidsim.workflows.again import experiment_again
 from rigidsim.workflows.read import text_difference
 from rigidsim.workflows.run import run

@@ -6,10 +6,10 @@ import pytest
 from support import config
 
 import rigidsim
-from rigidsim.cli.screens.words import verdict_line
+from rigidsim.cli.screens.summary import verdict_line
 from rigidsim.scene.cautions import WarningCode
 from rigidsim.session.verdict import LEAST, Soundness, verdict_on
-from rigidsim.store.summary_parts import AdviceCode
+from rigidsim.store.summary import AdviceCode
 
 LONG = config(  # some 24,000 steps
     time="end = 12000\nsamples = 101", integrator="hold_invariants = false", estimate=True

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rigidsim
-from rigidsim.cli.screens.words import verdict_line
+from rigidsim.cli.screens.summary import verdict_line
 from rigidsim.session.verdict import Soundness, verdict_on
 
 FAULTS = Path(__file__).parents[1] / "data" / "faults"

@@ -7,7 +7,7 @@ from support import config, run_estimated, run_text
 
 import rigidsim
 from experiments.averaged_motions import TIMES, axes_of, members, sound
-from rigidsim.cli.screens.words import verdict_line
+from rigidsim.cli.screens.summary import verdict_line
 
 FAULT = Path(__file__).parents[1] / "data" / "faults" / "resonance_no_error.toml"
 

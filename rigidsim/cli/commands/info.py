@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidsim.cli.screens.page import Page, print_json
-from rigidsim.cli.screens.summary import print_summary
-from rigidsim.cli.screens.words import arcsec_text
+from rigidsim.cli.screens.summary import arcsec_text, print_summary
 from rigidsim.store.fits import is_fit
 from rigidsim.store.run import open_run
 from rigidsim.store.sweeps.folder import is_sweep

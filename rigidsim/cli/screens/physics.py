@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rigidsim.cli.screens.page import Page, Styled
-from rigidsim.cli.screens.words import arcsec_text
+from rigidsim.cli.screens.summary import arcsec_text
 from rigidsim.scene.readable import span_text
 from rigidsim.workflows.physics.required import ComparedModel, PhysicsPlan
 

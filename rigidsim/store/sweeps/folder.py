@@ -20,7 +20,7 @@ from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError
 from rigidsim.store import atomic
 from rigidsim.store.folder import FileOf, WorkFolder
 from rigidsim.store.seal import check_seal, refuse_damaged
-from rigidsim.store.summary_parts import SummaryPart, first_of
+from rigidsim.store.summary import SummaryPart, first_of
 
 if TYPE_CHECKING:
     import xarray

@@ -177,7 +177,7 @@ def read_tile(path: Path, *, whole: bool = True) -> Tile:
         raise RunFolderError(f"{path}: can't be read as a tile ({error}); {again}") from None
 
 
-_TILES_IN_MEMORY = 96
+_HELD = 256e6  # bytes of tiles that stay in memory: each is read once for every variable
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,8 @@ class Sources:
 
     def __init__(self, sweep: Sweep, place: Path, files: Sequence[Path]) -> None:
         self.keys, self._items, self._place, self._files = keys_of(sweep), items_of(sweep), place, files
-        self.tile = lru_cache(_TILES_IN_MEMORY)(self._read)
+        size = sum(path.stat().st_size for path in files)
+        self.tile = lru_cache(int(_HELD * len(files) / max(size, 1)) + 1)(self._read)
 
     def _read(self, number: int) -> Tile:
         return read_tile(self._files[number])

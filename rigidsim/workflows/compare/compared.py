@@ -16,7 +16,7 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.store.outputs import refuse_loss, writing
 from rigidsim.store.run import Run
-from rigidsim.store.summary_parts import SummaryPart
+from rigidsim.store.summary import SummaryPart
 from rigidsim.workflows.compare.as_run import dataset_of_rows, files_of, trajectory_given
 from rigidsim.workflows.compare.columns import LEAST_ROWS, Attitudes, attitudes_of, size_of
 from rigidsim.workflows.compare.conventions import Convention, find_convention

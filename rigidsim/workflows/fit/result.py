@@ -22,7 +22,7 @@ from rigidsim.errors import RunFolderError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.row_rotations import conjugated, multiplied, normalised, turned, vector_of
 from rigidsim.store.run import ShownRun
-from rigidsim.store.summary_parts import SummaryPart
+from rigidsim.store.summary import SummaryPart
 from rigidsim.workflows.fit.estimation import Ended, Solution, Weighing, consider_covariance
 from rigidsim.workflows.fit.keys import FitKey, FitKeys
 from rigidsim.workflows.fit.observations import QUATERNION, Readings

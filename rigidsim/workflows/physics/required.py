@@ -30,8 +30,7 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.folder import RunFolder
 from rigidsim.store.outputs import refuse_inputs, refuse_loss, writing
 from rigidsim.store.run import SavedRun
-from rigidsim.store.summary import Summary
-from rigidsim.store.summary_parts import SummaryPart
+from rigidsim.store.summary import Summary, SummaryPart
 from rigidsim.workflows.physics.effects import effects_of, missing_from, outermost, without
 from rigidsim.workflows.read import Given, as_experiment
 from rigidsim.workflows.resume import resume

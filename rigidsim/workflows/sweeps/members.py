@@ -40,8 +40,7 @@ from rigidsim.solve.problem import prepare
 from rigidsim.solve.status import Status
 from rigidsim.store.netcdf import joined_parts
 from rigidsim.store.run import MemoryRun
-from rigidsim.store.summary import Summary
-from rigidsim.store.summary_parts import Modelling
+from rigidsim.store.summary import Modelling, Summary
 from rigidsim.store.sweeps.tiles import ALWAYS, Kept, KeptVariable
 from rigidsim.store.variables import Variable
 from rigidsim.workflows.analyse import analyse

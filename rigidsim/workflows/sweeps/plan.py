@@ -13,7 +13,7 @@ from rigidsim.scene.sweep import Sweep
 from rigidsim.session.dataset import dataset_variables, refuse_taken_names
 from rigidsim.solve.lanes import recommended_width
 from rigidsim.solve.problem import InitialValueProblem, prepare
-from rigidsim.store.summary_parts import SummaryPart
+from rigidsim.store.summary import SummaryPart
 from rigidsim.store.sweeps.tiles import OF_FITS, RESERVED, SUFFIXES
 from rigidsim.workflows.fit.keys import FitKeys
 from rigidsim.workflows.plan import RunPlan, plan
@@ -52,39 +52,39 @@ _BATCH_SECONDS = 2e-5  # seconds of overhead per member of a batch besides its i
 _ESTIMATED = 2.5  # cost ratio of a batch member with estimated errors to one without
 
 
-def check_sweep(sweep: Sweep, *, every: bool = True, each: Each = map) -> InitialValueProblem:
+def check_sweep(sweep: Sweep, *, each: Each = map, most: float = math.inf) -> InitialValueProblem:
     """Refuse a sweep with a member that can't be run, by ``ConfigError`` with members and keys; returns the
     first that can, prepared. To check the numbers of more than ``_ALL`` takes a second per million members of
     a product, most of a minute where each has values of its own; ``each`` may, like ``map``, have others look
-    at shares of them meanwhile.
+    at shares of them meanwhile. Of more than ``most`` members some are checked.
     """
     _refuse_names(sweep)
-    _refuse_what_none_has(sweep)
     first = prepare(sweep.worked_out(first_possible(sweep)))
     refuse_taken_names(first)
-    if sweep.table.impossible == "mark":
-        return first
-    given = _shares(sweep, each) if every else []  # others begin with them at once
-    problems = _worked_out(sweep, _FEWER)
-    if not problems:
-        refused, accepted = list[int](), 0
-        for refused, some in given:  # up to a share that tells of none
-            accepted += some
-            if refused or not some:
-                break
-        if accepted < sweep.count and sweep.count > _ALL:
-            problems = _worked_out(sweep, _OF_AN_AXIS)
-        if refused and not problems:
-            errors, _ = batches_of(sweep.experiment.text, sweep.experiment.source).refused(refused)
-            told = [sweep.with_member_named(member, errors[member]) for member in refused if member in errors]
-            problems = [problem for error in told for problem in error.problems]
-        if not problems and accepted < sweep.count <= _ALL and every and not sweep.fits:
-            problems = _worked_out(sweep, _FEWER, equations=True)
+    problems = _problems(sweep, each, most) if sweep.table.impossible != "mark" else []
     if len(problems) >= _MOST_TOLD:
         problems.append(Problem("[sweep]", "there may be more members of this kind; these came first"))
     if problems:
         raise ConfigError(markable(problems), sweep.experiment.source)
     return first
+
+
+def _problems(sweep: Sweep, each: Each, most: float) -> list[Problem]:
+    given = _shares(sweep, each) if sweep.count <= most else []  # others begin with them at once
+    if problems := _worked_out(sweep, _FEWER):
+        return problems
+    refused, accepted = list[int](), 0
+    for refused, some in given:  # up to a share that tells of none
+        accepted += some
+        if refused or not some:
+            break
+    if refused:
+        errors, _ = batches_of(sweep.experiment.text, sweep.experiment.source).refused(refused)
+        blamed = [sweep.with_member_named(member, errors[member]) for member in refused if member in errors]
+        return [problem for error in blamed for problem in error.problems]
+    if accepted == sweep.count:
+        return []
+    return _worked_out(sweep, _OF_AN_AXIS, equations=sweep.count <= _ALL and not sweep.fits)
 
 
 def _worked_out(sweep: Sweep, most: int, *, equations: bool = False) -> list[Problem]:
@@ -141,6 +141,7 @@ def _tried(sweep: Sweep, most: int) -> Iterator[int]:
 
 
 def _refuse_names(sweep: Sweep) -> None:
+    """Refuse names that the dataset needs itself, and what is to be kept of events where there are none."""
     states = [table.name for table in sweep.base.config.states]
     taken = RESERVED | {*OBSERVABLES, *states} | (OF_FITS if sweep.fits else set())
     problems = []
@@ -152,17 +153,11 @@ def _refuse_names(sweep: Sweep) -> None:
         if axis.name in taken or axis.name.endswith(SUFFIXES) or axis.name.endswith("_drift"):
             what = f'is named "{axis.name}", a name that the dataset needs itself; give it another name'
             problems.append(Problem(f'[sweep] axes."{axis.key}"', what))
+    for name in {"events", "section"} & {*sweep.table.keep} if not sweep.base.config.events else ():
+        what = f'given "{name}", but the config has no [[events]]; add one, or leave it out'
+        problems.append(Problem("[sweep] keep", what))
     if problems:
         raise ConfigError(problems, sweep.experiment.source)
-
-
-def _refuse_what_none_has(sweep: Sweep) -> None:
-    """Refuse items to be kept that need something the config doesn't have."""
-    keep = sweep.table.keep
-    for name in ("events", "section"):
-        if name in keep and not sweep.base.config.events:
-            what = f'given "{name}", but the config has no [[events]]; add one, or leave it out'
-            raise ConfigError(Problem("[sweep] keep", what), sweep.experiment.source)
 
 
 def refuse_untold_tiles(sweep: Sweep) -> None:
@@ -177,8 +172,8 @@ def refuse_untold_tiles(sweep: Sweep) -> None:
         raise ConfigError(Problem("[sweep] tile", what), sweep.experiment.source)
 
 
-def tile_length(sweep: Sweep) -> int:
-    """Number of members computed and saved at once: some seconds of work."""
+def tile_length(sweep: Sweep, made: RunPlan | None = None) -> int:
+    """Number of members computed and saved at once: some seconds of work; ``made``: the plan of one."""
     if sweep.table.tile is not None:
         return sweep.table.tile
     if sweep.fits:
@@ -186,9 +181,13 @@ def tile_length(sweep: Sweep) -> int:
     if sweep.count <= _FEW:
         return max(1, -(-sweep.count // _TILES_OF_FEW))
     first = first_possible(sweep)
-    made = plan(sweep.experiment_of(first), pilot_seconds=0.05)
+    seconds = _member_seconds(sweep, made or plan(sweep.experiment_of(first), pilot_seconds=0.05))
     size = bytes_of_member(sweep, prepare(sweep.worked_out(first)))
-    return _length(sweep, _member_seconds(sweep, made), size)
+    longest = min(max(seconds * sweep.count / _SHARE_OF_A_TILE, _LEAST_SECONDS), _SECONDS_OF_A_TILE)
+    most, length = min(longest / seconds, _LARGEST_TILE_BYTES / size), 8
+    while length < _LARGEST_TILE and 2 * length <= most and 32 * length < sweep.count:
+        length *= 2
+    return length
 
 
 def _member_seconds(sweep: Sweep, made: RunPlan) -> float:
@@ -205,16 +204,6 @@ def _member_seconds(sweep: Sweep, made: RunPlan) -> float:
     each = _ESTIMATED if sweep.base.config.output.estimate else 1.0
     # half of what lanes could gain
     return each * seconds / max(1.0, recommended_width() / 2) + _BATCH_SECONDS
-
-
-def _length(sweep: Sweep, seconds: float, size: float) -> int:
-    """Tile length for members that take so many seconds and bytes each."""
-    longest = min(max(seconds * sweep.count / _SHARE_OF_A_TILE, _LEAST_SECONDS), _SECONDS_OF_A_TILE)
-    most = min(longest / seconds, _LARGEST_TILE_BYTES / size)
-    length = 8
-    while length < _LARGEST_TILE and 2 * length <= most and 32 * length < sweep.count:
-        length *= 2
-    return length
 
 
 def bytes_of_member(sweep: Sweep, prepared: InitialValueProblem) -> float:
@@ -287,12 +276,10 @@ def plan_sweep(sweep: Sweep, *, out: str | Path = "runs") -> SweepPlan:
     ``plan``.
     """
     sweep = recording(sweep)
-    first = check_sweep(sweep, every=sweep.count <= QUICK)
+    first = check_sweep(sweep, most=QUICK)
     made = plan(sweep.experiment_of(first_possible(sweep)), out=out)
     seconds, size = _member_seconds(sweep, made), bytes_of_member(sweep, first)
-    length = sweep.table.tile
-    if length is None:
-        length = tile_length(sweep) if sweep.fits or sweep.count <= _FEW else _length(sweep, seconds, size)
+    length = tile_length(sweep, made)
     axes = [
         PlannedAxis(
             name=axis.name,

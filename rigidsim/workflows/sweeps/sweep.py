@@ -270,7 +270,8 @@ def _run(
             for _ in range(min(workers.count(), wanted.count)):
                 workers.executor.submit(get_ready, text, source)  # while this process still reads and checks
         known = begun if begun is not None and begun.config_sha256 == wanted.experiment.sha256 else None
-        check_sweep(wanted, every=known is None, each=each)  # a sweep begun before had all members checked
+        if known is None:  # a sweep that was begun before had all its members checked
+            check_sweep(wanted, each=each)
         length = tile_length(wanted) if known is None else known.tile
         with folder.locked(shared=share is not None):
             if share is None:
