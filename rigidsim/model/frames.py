@@ -40,10 +40,22 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.orbit_planes import OrbitPlane, flight_plane, kepler_plane, table_plane
 from rigidsim.model.probing import keeps
 from rigidsim.model.rotations import Symbolic, along, apply, transpose, unit
-from rigidsim.scene.arithmetic import Matrix, Vector, cross, norm, parallel
+from rigidsim.scene import attitude
+from rigidsim.scene.arithmetic import Matrix, Vector, cross, negligible, norm, parallel
+from rigidsim.scene.arithmetic import apply as multiply
 from rigidsim.scene.frame import ORBIT
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.starts import (
+    ATTITUDES,
+    InitialRotation,
+    StartForm,
+    angle_out_of_range,
+    attitude_from_pole,
+    from_equator,
+    meridian,
+    register_start,
+)
 
 
 @dataclass(frozen=True)
@@ -242,3 +254,31 @@ def jacobi_constant(m: Mechanics) -> Symbolic:
     carried = [m.number(motion * o) * x for o, x in pairs if o != 0]
     potentials = [m.carried(load.potential(m)) for load in m.turning]
     return m.kept_rotational_energy - hy.sum(carried) + reduce(add, potentials)
+
+
+# --- starts against the reference plane ---------------------------------------------------------------------
+
+
+def _from_obliquity(scene: Scene) -> InitialRotation:
+    """The attitude of the node on the reference plane and of the obliquity, as the observables."""
+    table, context = scene.config.initial, scene.context
+    assert table.obliquity is not None
+    assert table.node_longitude is not None
+    tilt, node = table.obliquity.at(context), table.node_longitude.at(context)
+    if not 0 <= tilt <= context.pi * (1 + negligible(context)):
+        raise angle_out_of_range("obliquity", "", context, tilt, "0 to 180 deg")
+    normal = initial_normal(scene, loads_of(scene))
+    length = norm(context, normal)
+    columns = transpose(plane_axes(context, [x / length for x in normal]))
+    to_space = attitude.quaternion_from_matrix(context, columns)
+    quaternion = attitude.product(to_space, attitude_from_pole(scene, node, tilt, context.zero))
+    if table.prime_meridian is not None:
+        w, x, y, z = equator = from_equator(scene, "prime_meridian")
+        inside = attitude.rotation_matrix(attitude.product([w, -x, -y, -z], quaternion))
+        east, north, up = multiply(inside, scene.figure.pole)
+        node, tilt = context.atan2(east, -north), context.atan2(context.hypot(east, north), up)
+        quaternion = attitude.product(equator, attitude_from_pole(scene, node, tilt, meridian(scene)))
+    return InitialRotation(attitude.unit_quaternion(context, quaternion))
+
+
+register_start(ATTITUDES, StartForm("obliquity", _from_obliquity, ("node_longitude",), ("prime_meridian",)))

@@ -13,8 +13,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import heyoka as hy
 
-from rigidsim.model.heyoka_expressions import TANGENT
 from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.names import TANGENT
 from rigidsim.model.observables.observable import Observable, only_when_named
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock, joined

@@ -21,7 +21,7 @@ from typing import Any, Protocol
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.heyoka_expressions import TANGENT
+from rigidsim.model.names import TANGENT
 from rigidsim.model.observables.mechanical import WORK
 from rigidsim.model.parametrised import parameters_of
 from rigidsim.model.system import System

@@ -11,7 +11,6 @@ from typing import Any
 import rigidsim.model.earth_frames
 import rigidsim.model.invariants
 import rigidsim.model.loads
-import rigidsim.model.starts
 import rigidsim.solve.equilibria  # noqa: F401  (each enters what it defines into a registry of rigidsim.scene)
 from rigidsim.errors import ConfigError, Problem, RunFolderError, run_again
 from rigidsim.scene.config import Experiment, Overrides, parse

@@ -18,8 +18,8 @@ import heyoka as hy
 import numpy as np
 from mpmath.libmp import from_man_exp
 
-from rigidsim.model.heyoka_expressions import TANGENT
 from rigidsim.model.model_plan import plan_model
+from rigidsim.model.names import TANGENT
 from rigidsim.model.scaling import Drive
 from rigidsim.model.system import System
 from rigidsim.scene.arithmetic import context_for
