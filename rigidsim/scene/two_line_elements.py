@@ -50,27 +50,18 @@ def parse_elements(value: Any) -> TwoLineElements:
             "the two lines as published, without the name"
         )
     lines = tuple(line.rstrip("\r\n ") for line in value)
-    if lines[0].startswith("2 ") and lines[1].startswith("1 "):
-        raise _refused(lines, "the lines are swapped; give the one that begins with 1 first")
     for number, (line, form) in enumerate(zip(lines, _FORMS, strict=True), start=1):
-        if len(line) != _LENGTH:
-            what = f"line {number} has {len(line)} characters; {_LENGTH} are allowed: copy it with all its "
-            raise _refused(lines, f"{what}blanks")
-        if not line.startswith(f"{number} "):
-            raise _refused(lines, f'line {number} begins with "{line[:2]}"; "{number} " is allowed there')
         if form.fullmatch(line) is None:
-            what = f"line {number} has something else in its columns than they are for; copy it as published"
-            raise _refused(lines, what)
-        if int(line[-1]) != (right := checksum(line)):
             what = (
-                f"line {number} ends with the checksum {line[-1]}, but its digits add up to {right}; one of "
+                f"line {number} (of {len(line)} characters) isn't in its columns; {_LENGTH} characters that "
             )
-            raise _refused(lines, f"{what}its characters is wrong: copy it again")
-    if lines[0][2:7] != lines[1][2:7]:
-        what = (
-            f"the lines are of two objects, {lines[0][2:7].strip()} and {lines[1][2:7].strip()}; give both "
-        )
-        raise _refused(lines, f"{what}of the same")
+            raise _refused(lines, f'{what}begin with "{number} " are allowed: copy them with all blanks')
+        if int(line[-1]) != (right := checksum(line)):
+            what = f"line {number} ends with the checksum {line[-1]}, but its digits add up to {right}"
+            raise _refused(lines, f"{what}; one of its characters is wrong: copy it again")
+    one, other = (line[2:7].strip() for line in lines)
+    if one != other:
+        raise _refused(lines, f"the lines are of two objects, {one} and {other}; give both of the same")
     return TwoLineElements((lines[0], lines[1]), _epoch(lines))
 
 
@@ -89,8 +80,7 @@ def _epoch(lines: tuple[str, ...]) -> Epoch:
         raise _refused(lines, f"line 1 is for day {text} of {year}; days from 1 to {days} are allowed")
     day = date(year, 1, 1).toordinal() + int(whole) - 1
     if day < UTC_BEGIN:
-        what = f"line 1 is for {date.fromordinal(day)}; dates from 1960-01-01 on, when UTC began, are allowed"
-        raise _refused(lines, what)
+        raise _refused(lines, f"line 1 is for {date.fromordinal(day)}; dates from 1960 on (UTC) are allowed")
     return Epoch("UTC", day, int(decimals) * 86400 * _TICKS // 10 ** len(decimals))
 
 

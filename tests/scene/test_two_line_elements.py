@@ -20,8 +20,8 @@ def test_blanks_at_the_ends_of_lines_do_not_matter() -> None:
     ("lines", "what"),
     [
         ([ONE[:-1] + "4", TWO], "line 1 ends with the checksum 4, but its digits add up to 3"),
-        ([TWO, ONE], "swapped"),
-        ([ONE[:-2], TWO], "line 1 has 67 characters; 69 are allowed"),
+        ([TWO, ONE], "line 1 (of 69 characters) isn't in its columns"),
+        ([ONE[:-2], TWO], "line 1 (of 67 characters) isn't in its columns; 69 characters"),
         ([ONE, TWO.replace("00005", "00014")], "two objects, 00005 and 00014"),
         ([ONE.replace("00179", "00400")[:-1] + "0", TWO], "days from 1 to 366"),
     ],
