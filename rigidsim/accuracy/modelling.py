@@ -23,6 +23,7 @@ from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.average import DIRECTION, Average, osculating
 from rigidsim.model.averaged.free_motion import FreeMotion
 from rigidsim.model.averaged.resonance import SlowStart
+from rigidsim.model.averaged.wobble import Wobble
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import apply, cross, dot, norm
 from rigidsim.scene.choices import FULL, MEAN, ORBIT_AVERAGED
@@ -194,8 +195,9 @@ class Window:
 
 
 def rotation_rates(motion: FreeMotion) -> list[float]:
-    """Rates of a free rotation, rad/s."""
-    return [abs(float(motion.precession_rate)), abs(float(motion.wobble_rate))]
+    """Rates of precession and wobble, rad/s; no wobble of a symmetric body, whose tensor doesn't show it."""
+    precession, wobble = Wobble.of(motion).rates
+    return [abs(precession), 0.0 if motion.symmetric else abs(wobble)]
 
 
 def motion_at(average: Average, states: Sequence[Any], exponent: int) -> FreeMotion:

@@ -1,8 +1,9 @@
-"""Free rotation over which torques are averaged: its mean inertia tensor and its two frequencies.
+"""Free rotation over which torques are averaged: its mean inertia tensor, and its amplitudes.
 
 A free body's angular momentum L is fixed in space while the body turns about it. One of its principal axes,
 the one that L circles in the body, precesses about L at the mean rate g and nods with the polhode's period
-2 pi / l. With I3 the moment of that axis, I2 the intermediate moment and I1 the remaining one,
+2 pi / l (``wobble`` has both rates). With I3 the moment of that axis, I2 the intermediate moment and I1 the
+remaining one,
 
     m = L / |L| = (M1 cn u, M2 sn u, M3 dn u),  u = p (t - t0),  parameter k^2
 
@@ -52,13 +53,7 @@ class FreeMotion:
     parameter: Any  # k^2; 0 for a symmetric body, and for a rotation about a principal axis
     squares: Vector  # means of the squared components of m along the axes
     amplitudes: Vector  # |M1|, |M2|, |M3|
-    precession_rate: Any  # g and l, rad/s; l is 0 if the tensor doesn't depend on its angle
-    wobble_rate: Any
-
-    @property
-    def symmetric(self) -> bool:
-        """Whether the first two moments are equal."""
-        return bool(self.wobble_rate == 0)
+    symmetric: bool  # whether the first two moments are equal
 
     @property
     def excess(self) -> Any:
@@ -100,8 +95,7 @@ def free_motion(context: Any, body: RigidBody, momentum: Vector, size: Any = Non
     if symmetric:
         across = context.sqrt(parts[0] ** 2 + parts[1] ** 2)
         squares, amplitudes = [across**2 / 2, across**2 / 2, parts[2] ** 2], [across, across, parts[2]]
-        moments, zero = [first, first, third], context.zero
-        return FreeMotion(size, moments, axes, zero, squares, amplitudes, size / first, zero)
+        return FreeMotion(size, [first, first, third], axes, context.zero, squares, amplitudes, True)
     # (L^2 - 2 E I) / L^2 for the moments of the third and the first axis
     of_third = sum(x * x * (1 - third / i) for x, i in zip(parts[:2], moments[:2], strict=True))
     of_first = sum(x * x * (1 - first / i) for x, i in zip(parts[1:], moments[1:], strict=True))
@@ -113,15 +107,10 @@ def free_motion(context: Any, body: RigidBody, momentum: Vector, size: Any = Non
         context.sqrt(abs(of_third * second / (second - third))),
         context.sqrt(abs(of_first * third / (third - first))),
     ]
-    complete, sines = context.ellipk(parameter), mean_square_sine(parameter, context.sqrt, _MEANS)
+    sines = mean_square_sine(parameter, context.sqrt, _MEANS)
     means = 1 - sines, sines, 1 - parameter * sines  # of cn^2, sn^2, dn^2
     squares = [a * a * x for a, x in zip(amplitudes, means, strict=True)]
-    pace = size * context.sqrt(abs(of_first * (third - second) / (first * second * third)))
-    n = third * (second - first) / (first * (second - third))
-    turning = context.ellippi(n, parameter) / complete
-    precession = size / third + size * (1 / first - 1 / third) * turning
-    wobble = context.pi * pace / (2 * complete)
-    return FreeMotion(size, moments, axes, parameter, squares, amplitudes, precession, wobble)
+    return FreeMotion(size, moments, axes, parameter, squares, amplitudes, symmetric)
 
 
 def _ordered(context: Any, body: RigidBody, momentum: Vector, length: Any) -> tuple[Vector, Matrix, bool]:
