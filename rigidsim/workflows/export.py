@@ -58,15 +58,13 @@ def export(
             raise RigidsimError(
                 f"--{name.replace('_', '-')}: {file_format} has no place for it; leave it out"
             )
-    if variables and not found.angles:
-        raise RigidsimError(
-            f"--variable: {file_format} prescribes what it holds; csv, parquet and zarr don't"
-        )
     unit = None if angle_unit is None else angle_unit_named(angle_unit)
-    if unit is not None and not found.angles:
-        raise RigidsimError(
-            f"--angle-unit: given {angle_unit}, but {file_format} prescribes its units; leave it out"
-        )
+    for option, given in (("--variable", ", ".join(variables)), ("--angle-unit", angle_unit)):
+        if given and not found.angles:
+            raise RigidsimError(
+                f"{option}: given {given}, but {file_format} prescribes what it holds; csv, parquet and zarr "
+                "don't"
+            )
     name = saved.folder.path.resolve().name
     target = Path(f"{name}{found.suffix or f'.{file_format}'}") if out is None else Path(out)
     if isinstance(saved, SavedRun):

@@ -20,7 +20,7 @@ from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.netcdf import root_attributes
 from rigidsim.store.provenance import SETTING, changed, platform_of, read_attributes
 from rigidsim.store.reader import open_dataset
-from rigidsim.store.run import Run, open_run
+from rigidsim.store.run import open_run
 from rigidsim.store.seal import check_seal
 from rigidsim.store.summary import Brief, Claim, Summary
 from rigidsim.workflows.again import experiment_again
@@ -88,7 +88,11 @@ def verify(path: str | Path, *, reversed: bool = False, observer: Observer | Non
         KeyboardInterrupt: the integration was interrupted; nothing was compared.
     """
     dataset, folder = _dataset(Path(path))
-    broken = _seal_problems(dataset)
+    broken: list[str] = []
+    try:
+        check_seal(dataset)
+    except RunFolderError as error:
+        broken.append(str(error))
     try:
         experiment = experiment_again(dataset)
         open_dataset(dataset, **_AS_STORED).close()
@@ -146,22 +150,12 @@ def _dataset(path: Path) -> tuple[Path, RunFolder | None]:
     return folder.dataset, None if alone else folder
 
 
-def _seal_problems(dataset: Path) -> list[str]:
-    """What is wrong with the dataset's seal, if anything."""
-    try:
-        check_seal(dataset)
-    except RunFolderError as error:
-        return [str(error)]
-    return []
-
-
 def _file_problems(dataset: Path, folder: RunFolder | None) -> list[str]:
-    """Other faults that the files themselves show, before anything is integrated."""
+    """Faults besides the seal's that the files themselves show, before anything is integrated."""
     problems: list[str] = []
     if folder is None:
         return problems
-    opened: Run = open_run(folder.path)
-    claimed = opened.outcome.dataset_digest
+    claimed = open_run(folder.path).outcome.dataset_digest
     if claimed is not None and claimed != provenance.file_sha256(dataset):
         problems.append(f"{folder.summary}: was written for another dataset than this one")
     try:

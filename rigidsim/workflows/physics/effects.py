@@ -60,11 +60,8 @@ def missing_from(config: Config) -> list[tuple[str, str]]:
         if effect.missing:
             rows.setdefault((effect.words, effect.missing), []).extend(effect.parts_of[:1])
     loads = set(load_codes(config))
-    found = []
-    for (words, why), codes in rows.items():
-        named = [code for code in codes if code in loads]
-        found.append((f"{words} ({', '.join(named)})" if named else words, why))
-    return found
+    named = {row: ", ".join(code for code in codes if code in loads) for row, codes in rows.items()}
+    return [(f"{words} ({of})" if of else words, why) for (words, why), of in named.items()]
 
 
 def _all(config: Config) -> Iterator[PhysicalEffect]:
@@ -130,14 +127,12 @@ def settings_without(experiment: Experiment, codes: Sequence[str]) -> list[str]:
     for key, kind in LOADS["body"].items():
         if kind.brought_by(config) and key not in codes:
             values = {f"body.{key}.{x}": y for x, y in kind.without_loads(config, names).items()} | values
-    found = assignments_of(values)
-    for array in dict.fromkeys(array for array, _ in gone):
-        places = [n for other, n in gone if other == array]
-        if len(places) == len(getattr(config, array)):
-            found.append(f"{array}=")
-        else:
-            found += [f"{array}[{n}]=" for n in reversed(places)]
-    return found
+    counts = Counter(array for array, _ in gone)
+    removed = dict.fromkeys(
+        array if counts[array] == len(getattr(config, array)) else f"{array}[{n}]"
+        for array, n in reversed(gone)
+    )
+    return [*assignments_of(values), *(f"{key}=" for key in removed)]
 
 
 def without(experiment: Experiment, codes: Sequence[str]) -> Experiment:
