@@ -37,7 +37,7 @@ from rigidsim.scene.arithmetic import (
 )
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.tracing.numbers import Traced, plain
+from rigidsim.scene.tracing import Traced, plain
 
 _STATES = 3
 _SWEPT = "swept"  # numbers of a sweep's member that the probes have read

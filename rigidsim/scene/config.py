@@ -21,10 +21,18 @@ from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import NAME_OR_VECTOR
 from rigidsim.scene.kernels.reading import EMBEDDED, folders_of
 from rigidsim.scene.paths import leaves
-from rigidsim.scene.python_values import assignments_of, inline, toml_text
 from rigidsim.scene.registry import LOADS
 from rigidsim.scene.schema import Config, config_model
-from rigidsim.scene.toml_text import FLAG, apply_overrides, long_integers, parse_toml, written
+from rigidsim.scene.toml_text import (
+    FLAG,
+    apply_overrides,
+    assignments_of,
+    inline,
+    long_integers,
+    parse_toml,
+    toml_text,
+    written,
+)
 from rigidsim.scene.validation_errors import config_error
 
 Overrides = Sequence[str] | Mapping[str, Any]

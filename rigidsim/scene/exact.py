@@ -13,13 +13,17 @@ from typing import Any
 
 import mpmath
 
+from rigidsim.errors import ensure
 from rigidsim.scene import units
 from rigidsim.scene.validation_messages import shown
 
 # Far past any physical quantity and any precision, and still quick to expand into integers.
 _LARGEST_DECIMAL_EXPONENT = 5000
 _LONGEST_TEXT = 5000
-_TOO_LONG = f"digits and exponent of a number may make at most {_LARGEST_DECIMAL_EXPONENT}"
+_TOO_LONG = (
+    f"digits and exponent of a number may make at most {_LARGEST_DECIMAL_EXPONENT}; write fewer digits"
+)
+_TOO_LONG += " or a larger unit"
 
 _LONGEST_DECIMAL = 150  # digits of a decimal that is written out
 _PLAIN_DIGITS = 18
@@ -127,23 +131,19 @@ def _rational(text: str | Decimal) -> Fraction:
     try:
         number = text if isinstance(text, Decimal) else Decimal(text.replace("_", ""))
     except InvalidOperation:  # an exponent past what Decimal itself holds
-        raise ValueError(f"{_TOO_LONG}; write fewer digits or a larger unit") from None
-    if not number.is_finite():
-        raise ValueError("finite numbers are allowed")
-    exponent = number.as_tuple().exponent
-    assert isinstance(exponent, int)
-    if number and abs(exponent) + len(number.as_tuple().digits) > _LARGEST_DECIMAL_EXPONENT:
-        raise ValueError(f"{_TOO_LONG}; write fewer digits or a larger unit")
+        raise ValueError(_TOO_LONG) from None
+    ensure(number.is_finite(), ValueError("finite numbers are allowed"))
+    length = abs(int(number.as_tuple().exponent)) + len(number.as_tuple().digits)
+    ensure(not number or length <= _LARGEST_DECIMAL_EXPONENT, ValueError(_TOO_LONG))
     return Fraction(number)
 
 
 def _power(base: Fraction, exponent: Fraction) -> Fraction:
-    if exponent.denominator != 1 or abs(exponent) > _LARGEST_DECIMAL_EXPONENT:
-        raise ValueError(
-            f"a power in a number needs a whole exponent of at most {_LARGEST_DECIMAL_EXPONENT}, as in 2^-20"
-        )
-    if base == 0 or max(abs(base.numerator), base.denominator) > 10**6:
-        raise ValueError("a power in a number needs a base between 1e-6 and 1e6, as in 2^-20")
+    whole = exponent.denominator == 1 and abs(exponent) <= _LARGEST_DECIMAL_EXPONENT
+    what = f"a power in a number needs a whole exponent of at most {_LARGEST_DECIMAL_EXPONENT}, as in 2^-20"
+    ensure(whole, ValueError(what))
+    what = "a power in a number needs a base between 1e-6 and 1e6, as in 2^-20"
+    ensure(base and max(abs(base.numerator), base.denominator) <= 10**6, ValueError(what))
     return base ** int(exponent)
 
 
@@ -163,14 +163,13 @@ def _product(text: str) -> tuple[Fraction, int]:
                 raise ValueError(f"a power of pi has a whole exponent of at most {_LARGEST_POWER_OF_PI}")
             factor, turns = Fraction(-1 if step["pi"].startswith("-") else 1), int(exponent)
         if step["operator"] == "/":
-            if factor == 0:
-                raise ValueError("a divisor other than zero is allowed")
+            ensure(factor, ValueError("a divisor other than zero is allowed"))
             factor, turns = 1 / factor, -turns
         rational, pi_power = rational * factor, pi_power + turns
-        if max(rational.numerator.bit_length(), rational.denominator.bit_length()) > _LARGEST_BITS:
-            raise ValueError(f"{_TOO_LONG}; write fewer digits or a larger unit")
-        if count > _MOST_FACTORS or abs(pi_power) > _LARGEST_POWER_OF_PI:
-            raise ValueError(f"at most {_MOST_FACTORS} factors are allowed")
+        bits = max(rational.numerator.bit_length(), rational.denominator.bit_length())
+        ensure(bits <= _LARGEST_BITS, ValueError(_TOO_LONG))
+        few = count <= _MOST_FACTORS and abs(pi_power) <= _LARGEST_POWER_OF_PI
+        ensure(few, ValueError(f"at most {_MOST_FACTORS} factors are allowed"))
     return rational, pi_power
 
 

@@ -160,34 +160,6 @@ class InUnit:
         return number_schema(self.unit)
 
 
-_LEADING_NUMBER = re.compile(r"\s*[-+]?(?:\d[\d_]*\.?[\d_]*|\.\d[\d_]*)(?:[eE][-+]?\d+)?")
-
-
-@dataclass(frozen=True)
-class InUnitOrFormula(InUnit):
-    """Annotation of an ``ExactNumber`` as ``InUnit`` reads it, or of the text of an expression."""
-
-    def _parse(self, value: Any) -> Any:
-        try:
-            return parse_number(value, self.unit)
-        except ValueError:
-            if isinstance(value, str) and _is_formula(value):
-                return value
-            raise
-
-    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
-        return {"anyOf": [{"type": "number"}, {"type": "string"}], "x-unit": self.unit}
-
-
-def _is_formula(text: str) -> bool:
-    """Whether a text that is no number is an expression, rather than a number with a wrong unit."""
-    number = _LEADING_NUMBER.match(text)
-    if number is None:
-        return re.search(r"[A-Za-z]", text) is not None and "," not in text.partition("(")[0]
-    rest = re.sub(r"\^[-+]", "^", text[number.end() :]).strip()
-    return re.search(r"[-+*(]", rest) is not None or re.match(r"/\s*[A-Za-z]", rest) is not None
-
-
 def quantity(unit: str) -> Any:
     """Type of a key in an SI unit, for loads of your own: ``Joule = quantity("J")``."""
     return Annotated[ExactNumber, InUnit(unit)]
@@ -247,7 +219,6 @@ Metre = Annotated[ExactNumber, InUnit("m")]
 Kilogram = Annotated[ExactNumber, InUnit("kg")]
 Second = Annotated[ExactNumber, InUnit("s")]
 Moment = Annotated[ExactNumber, InUnit("kg m^2")]
-MomentOrFormula = Annotated[ExactNumber | str, InUnitOrFormula("kg m^2")]
 Rate = Annotated[ExactNumber, InUnit("rad/s")]
 PerSecond = Annotated[ExactNumber, InUnit("s^-1")]
 Angle = Annotated[ExactNumber, InUnit("rad")]
@@ -287,6 +258,9 @@ class NumberOrFormula(InUnit):
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
         return {"anyOf": [{"type": "string"}, {"type": "number"}], "x-unit": self.unit}
+
+
+MomentOrFormula = Annotated[ExactNumber | str, NumberOrFormula("kg m^2")]
 
 
 @dataclass(frozen=True)

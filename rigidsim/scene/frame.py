@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Tag
 
-from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
+from rigidsim.errors import ConfigError, Problem, ensure
+from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm, vector
 from rigidsim.scene.bodies.body import RigidBody
 from rigidsim.scene.fields import NAME_OR_VECTOR, ConfigTable, Dimensionless, Triple, name_or_vector
 from rigidsim.scene.space_axes import SpaceAxes
@@ -64,20 +64,16 @@ def figure_of(table: Frame, body: RigidBody, context: Any) -> Figure:
         pole = [one if name == asked else zero for name in "xyz"]
         return _with_equator(context, pole, f"body axis {asked}")
     found = _symmetry(body, context)
-    if asked == "symmetry" and found is None:
-        what = (
-            'given "symmetry", but no two principal moments alone are equal; "x", "y", "z" or "largest" is '
-        )
-        raise _fault("figure_axis", what + "allowed here")
+    what = 'given "symmetry", but no two principal moments alone are equal; "x", "y", "z" or "largest" is '
+    ensure(asked != "symmetry" or found is not None, _fault("figure_axis", what + "allowed here"))
     if asked != "largest" and found is not None:
         return _with_equator(context, found, "axis of symmetry")
     axis = unique_axis(body, context, largest=True)
     if axis is not None:
         return _with_equator(context, axis, "axis of largest moment")
-    if asked == "largest":
-        what = 'given "largest", but the two largest principal moments are equal; "x", "y" or "z"'
-        more = ' or "symmetry"' if found else ""
-        raise _fault("figure_axis", f"{what}{more} is allowed here")
+    what = 'given "largest", but the two largest principal moments are equal; "x", "y" or "z"'
+    more = ' or "symmetry"' if found else ""
+    ensure(asked != "largest", _fault("figure_axis", f"{what}{more} is allowed here"))
     return _with_equator(context, [zero, zero, one], "body axis z, as good as any of a sphere")
 
 
@@ -98,10 +94,10 @@ def reference_normal(table: Frame, context: Any) -> Vector | None:
         return None
     if isinstance(asked, str):
         return [context.zero, context.zero, context.one]
-    given = [x.at(context) for x in asked]
+    given = vector(context, asked)
     length = norm(context, given)
-    if length == 0:
-        raise _fault("reference", "given the zero vector; a normal [x, y, z] of any other length is allowed")
+    what = "given the zero vector; a normal [x, y, z] of any other length is allowed"
+    ensure(length != 0, _fault("reference", what))
     return [x / length for x in given]
 
 

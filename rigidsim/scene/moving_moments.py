@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import Names, names_of
@@ -47,15 +47,16 @@ def formulas_of(config: Config, names: Names | None = None) -> list[Expression]:
         where = f"{WHERE}[{axis}]"
         try:
             formula = parse_expression(text, names, parameters=config.parameters, unit="kg m^2", where=where)
+            others = ", ".join(sorted(names_used(formula) - allowed))
+            what = f"it reads {others}; moments may read t, [[states]] and [parameters]"
+            ensure(not others, ExpressionError(f"{what}: let a state of [[states]] follow it"))
+            what = "it jumps, and mass takes time to move; make the change smooth with tanh"
+            ensure(
+                not _JUMPS.search(text), ExpressionError(f"{what}, or let a state of [[states]] follow it")
+            )
         except ExpressionError as error:
-            said = f'given "{text}", which is neither a number nor an expression that can be read: {error}'
+            said = f'given "{text}", which is no number and no expression that is allowed here: {error}'
             raise ConfigError(Problem(where, said)) from None
-        if others := sorted(names_used(formula) - allowed):
-            what = f'given "{text}", which reads {", ".join(others)}; moments may read t, [[states]] and '
-            raise ConfigError(Problem(where, what + "[parameters]: let a state of [[states]] follow it"))
-        if _JUMPS.search(text):
-            what = f'given "{text}", which jumps: mass takes time to move; make the change smooth with '
-            raise ConfigError(Problem(where, what + "tanh, or let a state of [[states]] follow it"))
         found.append(formula)
     return found
 
@@ -75,10 +76,10 @@ def moments_at_start(config: Config, context: Any, start: Any) -> Vector | None:
             raise ConfigError(Problem(f"{WHERE}[{axis}]", f"no finite value at the start: {error}")) from None
     if names_used(*found):
         least = least_part(config.integrator.precision)
-        small = next((i for i in range(3) if 0 <= moments[i] <= least * sum(moments)), None)
-        if small is not None:
-            what = f"given {context.nstr(moments[small], 6)} kg m^2 at the start, with moments that vary; "
-            raise ConfigError(
-                Problem(f"{WHERE}[{small}]", what + f"each has to be more than {least:.1g} of their sum")
+        for axis, moment in enumerate(moments):
+            what = (
+                f"given {context.nstr(moment, 6)} kg m^2 at the start, with moments that vary; each has to "
             )
+            fault = Problem(f"{WHERE}[{axis}]", what + f"be more than {least:.1g} of their sum")
+            ensure(not 0 <= moment <= least * sum(moments), ConfigError(fault))
     return moments or None

@@ -15,8 +15,7 @@ from rigidsim.scene.orbit_tables.elements import read_table
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.registry import Setting
 from rigidsim.scene.text_tables import TableError
-from rigidsim.scene.tracing.arithmetic import TracedExact
-from rigidsim.scene.tracing.numbers import Traced, Untraceable
+from rigidsim.scene.tracing import Traced, TracedExact, Untraceable
 from rigidsim.scene.validation_messages import nearest
 
 

@@ -22,11 +22,10 @@ from rigidsim.scene.choices import AUTO, FULL
 from rigidsim.scene.config import Experiment, validated
 from rigidsim.scene.exact import ExactNumber, fraction_of, parse_number
 from rigidsim.scene.paths import Path, leaves
-from rigidsim.scene.python_values import inline
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.schema import config_model
 from rigidsim.scene.sweep_table import INDICATORS, LARGEST_AXIS, AxisTable, SweepTable
-from rigidsim.scene.toml_text import apply_overrides, parse_toml
+from rigidsim.scene.toml_text import apply_overrides, inline, parse_toml
 from rigidsim.scene.validation_messages import nearest, shown
 
 MOST_MEMBERS = 100_000_000

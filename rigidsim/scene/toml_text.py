@@ -1,17 +1,21 @@
-"""Reading TOML with every digit as written, within bounded time and memory; and values replaced in a config's
-tables, and in place in its text (``--set KEY=VALUE``).
+"""TOML with every digit as written: read within bounded time and memory, with values replaced in a config's
+tables and in place in its text (``--set KEY=VALUE``), and written of Python values, for configs in code.
 """
 
+import numbers
 import re
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from datetime import date, time
 from decimal import Decimal, InvalidOperation
+from fractions import Fraction
 from typing import Any
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, ensure
+from rigidsim.scene.exact import fraction_of
 from rigidsim.scene.paths import Path, leaves
 from rigidsim.scene.validation_messages import LONGEST_INTEGER, shown
 
@@ -43,16 +47,15 @@ def _refuse_fine_dates(text: str) -> None:
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
     """The tables of a TOML text, decimals kept as written."""
-    deep = _DEEP_KEY.search(text)
-    if deep is not None:
-        line = text.count("\n", 0, deep.start()) + 1
-        what = f"can't be read: a key of more than {_DEEPEST_KEY} parts (at line {line})"
-        raise ConfigError(Problem("TOML", what), source)
-    broken = _SURROGATE.search(text)
-    if broken is not None:  # of an argument or a file name that isn't UTF-8
-        line = text.count("\n", 0, broken.start()) + 1
-        what = f"can't be read: holds bytes that are no UTF-8 text (at line {line}); write it in UTF-8"
-        raise ConfigError(Problem("TOML", what), source)
+    hindrances = (
+        (_DEEP_KEY, f"a key of more than {_DEEPEST_KEY} parts (at line {{}})"),
+        # of an argument or a file name that isn't UTF-8
+        (_SURROGATE, "holds bytes that are no UTF-8 text (at line {}); write it in UTF-8"),
+    )
+    for pattern, what in hindrances:
+        if found := pattern.search(text):
+            line = text.count("\n", 0, found.start()) + 1
+            raise ConfigError(Problem("TOML", f"can't be read: {what.format(line)}"), source)
     try:
         _refuse_fine_dates(text)
         return tomllib.loads(text, parse_float=decimal)
@@ -108,19 +111,16 @@ def apply_overrides(table: dict[str, Any], overrides: Sequence[str], what: str =
     as a bare word or a number with its unit, is a string); nothing after the equals sign removes the key.
     Messages call them ``what``.
     """
-    if len(overrides) > _MOST_OVERRIDES:
-        many = f"given {len(overrides)} values to set; at most {_MOST_OVERRIDES} are allowed"
-        raise ConfigError(Problem(what, many))
-    for assignment in overrides:
-        _apply(table, assignment, f"{what} {assignment[:60]}", _plain_value)
+    many = f"given {len(overrides)} values to set; at most {_MOST_OVERRIDES} are allowed"
+    ensure(len(overrides) <= _MOST_OVERRIDES, ConfigError(Problem(what, many)))
+    _apply(table, overrides, what, _plain_value)
 
 
 def written(text: str, overrides: Sequence[str], meant: dict[str, Any], source: str, what: str = FLAG) -> str:
     """A text with values replaced in place, in the digits given, so that its tables are ``meant``."""
     try:
         document = tomlkit.parse(text)
-        for assignment in overrides:
-            _apply(document, assignment, what, _written_value)
+        _apply(document, overrides, what, _written_value)
         result = document.as_string()
         if parse_toml(result, source) == meant:
             return result
@@ -130,20 +130,22 @@ def written(text: str, overrides: Sequence[str], meant: dict[str, Any], source: 
     raise ConfigError(Problem(f"{what} {overrides[-1][:60]}", why), source)
 
 
-def _apply(table: dict[str, Any], assignment: str, where: str, read: Callable[[str], Any]) -> None:
-    key, equals, value_text = (part.strip() for part in assignment.partition("="))
-    if not equals or not key or "\n" in assignment:
-        raise ConfigError(Problem(where, "write KEY=VALUE on one line, such as time.end=10"))
-    if _DEEP_KEY.search(assignment):
-        raise ConfigError(Problem(where, f"a key of more than {_DEEPEST_KEY} parts"))
-    try:
-        value = read(value_text) if value_text else None
-    except (ValueError, RecursionError):
-        value = value_text
-    try:
-        Path.of(key).set(table, value)
-    except ValueError as error:
-        raise ConfigError(Problem(where, str(error))) from None
+def _apply(table: dict[str, Any], overrides: Sequence[str], what: str, read: Callable[[str], Any]) -> None:
+    for assignment in overrides:
+        where = f"{what} {assignment[:60]}"
+        key, equals, text = (part.strip() for part in assignment.partition("="))
+        fault = Problem(where, "write KEY=VALUE on one line, such as time.end=10")
+        ensure(equals and key and "\n" not in assignment, ConfigError(fault))
+        deep = Problem(where, f"a key of more than {_DEEPEST_KEY} parts")
+        ensure(not _DEEP_KEY.search(assignment), ConfigError(deep))
+        try:
+            value = read(text) if text else None
+        except (ValueError, RecursionError):
+            value = text
+        try:
+            Path.of(key).set(table, value)
+        except ValueError as error:
+            raise ConfigError(Problem(where, str(error))) from None
 
 
 def _plain_value(text: str) -> Any:
@@ -167,3 +169,122 @@ def assignments(text: str, keys: Sequence[str]) -> list[str]:
         if name in document.get(table, {}):
             found.append(f"{key}={document[table][name].as_string()}")
     return found
+
+
+# --- Python values ------------------------------------------------------------------------------------------
+
+_DEEPEST = 50
+_ALLOWED = (
+    "numbers (int, float, Decimal, Fraction, mpf, numpy's), strings, booleans, dates, lists, "
+    "arrays and dictionaries are allowed"
+)
+
+
+def toml_text(tables: Mapping[str, Any]) -> str:
+    """The TOML text of a config given as nested dictionaries; None counts as not given.
+
+    Floats, numpy's too, count as the shortest decimal that denotes them, which is how they print: ``0.1`` is
+    one tenth. Decimals, fractions and mpmath's numbers count exactly.
+    """
+    document = tomlkit.document()
+    for key, value in tables.items():
+        plain = _plain(value)
+        if isinstance(plain, Mapping):
+            document[_key(key)] = _table(plain, key)
+        elif isinstance(plain, list) and plain and all(isinstance(entry, Mapping) for entry in plain):
+            document[_key(key)] = tomlkit.aot()
+            for number, entry in enumerate(plain):
+                document[key].append(_table(entry, f"{key}[{number}]"))  # type: ignore[union-attr]
+        elif value is not None:
+            document[_key(key)] = tomlkit.value(inline(value, str(key)))
+    return document.as_string()
+
+
+def _table(tables: Mapping[str, Any], where: str) -> Any:
+    table = tomlkit.table()
+    for key, value in tables.items():
+        if value is not None:
+            table[_key(key)] = tomlkit.value(inline(value, f"{where}.{key}"))
+    return table
+
+
+def assignments_of(changes: Mapping[str, Any]) -> list[str]:
+    """Values to replace as ``KEY=VALUE``; a dictionary changes its keys of a table, None removes a key."""
+    found = []
+    for key, value in changes.items():
+        if isinstance(value, Mapping):
+            mark = '"' if key == "sweep.axes" else ""  # whose keys are dotted themselves
+            found += assignments_of(
+                {f"{key}.{mark}{_key(inner)}{mark}": given for inner, given in value.items()}
+            )
+        else:
+            found.append(f"{_key(key)}={'' if value is None else inline(value, str(key))}")
+    return found
+
+
+def inline(value: Any, where: str = "value", depth: int = 0) -> str:
+    """A TOML value on one line."""
+    plain = _plain(value)
+    ensure(depth <= _DEEPEST, ConfigError(Problem(where, "nested too deeply")))
+    if isinstance(plain, str):
+        return tomlkit.string(plain).as_string()
+    if isinstance(plain, bool | int):
+        return str(plain).lower()
+    if isinstance(plain, Decimal):
+        fault = Problem(where, f"given {plain}; finite numbers are allowed")
+        ensure(plain.is_finite(), ConfigError(fault))
+        text = str(plain).lower().replace("e+", "e")
+        return text if "." in text or "e" in text else f"{text}.0"
+    if isinstance(plain, Mapping):
+        named = (
+            (tomlkit.string(_key(k)).as_string(), inline(v, f"{where}.{k}", depth + 1))
+            for k, v in plain.items()
+        )
+        return "{" + ", ".join(f"{key} = {text}" for key, text in named) + "}"
+    if isinstance(plain, list):
+        entries = (inline(entry, f"{where}[{n}]", depth + 1) for n, entry in enumerate(plain))
+        return "[" + ", ".join(entries) + "]"
+    raise ConfigError(Problem(where, f"given {shown(value)}; {_ALLOWED}"))
+
+
+def _plain(value: Any) -> Any:
+    """A value of Python's own, or of a related type, as bool, int, Decimal, str, list or mapping."""
+    if isinstance(value, bool | str | int | Decimal | Mapping):
+        return value
+    if isinstance(value, date | time):
+        return value.isoformat()
+    kind = value.dtype.kind if hasattr(value, "dtype") else ""
+    if kind and value.shape:  # an array; its elements keep their kind
+        return list(value)
+    if kind == "b":
+        return bool(value)
+    if isinstance(value, Fraction):
+        return f"{value.numerator}/{value.denominator}" if value.denominator != 1 else value.numerator
+    if hasattr(value, "_mpf_"):
+        _, mantissa, exponent, _ = value._mpf_
+        if exponent and not mantissa:  # infinite, or not a number
+            return value
+        exact = fraction_of(value)
+        power = exact.denominator.bit_length() - 1  # of two
+        return Decimal(f"{exact.numerator * 5**power}e{-power}")
+    if isinstance(value, numbers.Integral):
+        return int(value)
+    if isinstance(value, numbers.Real) or kind == "f":
+        return Decimal(_shortest(value))
+    if hasattr(value, "magnitude") and hasattr(value, "units"):  # a quantity of pint
+        return f"{_shortest(value.magnitude)} {value.units:~C}"
+    if isinstance(value, Sequence):
+        return list(value)
+    return value
+
+
+def _shortest(value: Any) -> str:
+    """The shortest decimal that denotes a number, without numpy's wrapping."""
+    text = str(value)
+    return text[text.find("(") + 1 : text.find(")")].strip("'") if "(" in text else text
+
+
+def _key(key: Any) -> str:
+    if not isinstance(key, str) or not key:
+        raise ConfigError(Problem("config", f'given the key {shown(key)}; a key is a text, such as "end"'))
+    return key

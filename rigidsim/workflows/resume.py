@@ -11,9 +11,8 @@ from rigidsim.errors import FORCE, Remedy, RunFolderError
 from rigidsim.model.load import Load
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.config import Experiment, Overrides, parse
-from rigidsim.scene.python_values import assignments_of
 from rigidsim.scene.scene import build_scene
-from rigidsim.scene.toml_text import assignments
+from rigidsim.scene.toml_text import assignments, assignments_of
 from rigidsim.session.dataset import root_attributes as attributes_now
 from rigidsim.session.execution import execute, with_timeline
 from rigidsim.session.progress import watched

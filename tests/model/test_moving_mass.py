@@ -167,7 +167,7 @@ VARYING = '"1 + 0.1*sin(t)"'
         (f"[{VARYING}, 2, 4]", "", "the largest is more than the sum of the other two"),
         ('["-1 - t", 2, 2]', "", "can't be negative"),
         ('["1 + 0.1*wx", 2, 2]', "", "reads wx; moments may read t, [[states]] and [parameters]"),
-        ('["1 + 0.5*step(t - 1)", 2, 2]', "", "which jumps: mass takes time to move"),
+        ('["1 + 0.5*step(t - 1)", 2, 2]', "", "jumps, and mass takes time to move"),
         (f"[{VARYING}, 2, 2]", '[integrator]\nformulation = "canonical"', "principal_moments vary"),
     ],
 )

@@ -73,7 +73,7 @@ from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.point_masses import PointMasses
 from rigidsim.scene.registry import SceneLoad, Setting, register_load
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.tracing.numbers import plain
+from rigidsim.scene.tracing import plain
 
 
 def _of_placement(name: str) -> Any:

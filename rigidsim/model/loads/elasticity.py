@@ -41,7 +41,7 @@ from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.registry import Setting, names_of, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
-from rigidsim.scene.tracing.numbers import plain
+from rigidsim.scene.tracing import plain
 from rigidsim.scene.validation_messages import nearest
 
 T = TypeVar("T")

@@ -38,7 +38,7 @@ from rigidsim.scene.frame import unique_axis
 from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
-from rigidsim.scene.tracing.numbers import plain
+from rigidsim.scene.tracing import plain
 
 STATES = ("core_wx", "core_wy", "core_wz")
 _ROUNDING_OF_INPUT = 1e-14  # relative, of moments that a double-precision program printed

@@ -32,7 +32,7 @@ from rigidsim.scene.moving_moments import formulas_of, least_part
 from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
-from rigidsim.scene.tracing.numbers import plain
+from rigidsim.scene.tracing import plain
 
 _CLOCK = "t_of_moments"
 _ELEMENTS = ("moment_x", "moment_y", "moment_z")

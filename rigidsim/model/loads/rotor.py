@@ -37,7 +37,7 @@ from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.rotors import Bearing, RotorTable
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
-from rigidsim.scene.tracing.numbers import plain
+from rigidsim.scene.tracing import plain
 
 
 @register_load(table="rotors")

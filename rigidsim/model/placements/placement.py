@@ -35,7 +35,7 @@ from rigidsim.scene.point_masses import PointMasses
 from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.space_axes import ECLIPTIC
-from rigidsim.scene.tracing.numbers import plain
+from rigidsim.scene.tracing import plain
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.paths import Path
 from rigidsim.scene.sweep import Sweep
-from rigidsim.scene.tracing.numbers import Traced, Untraceable
+from rigidsim.scene.tracing import Traced, Untraceable
 from rigidsim.solve.batch.tracing import TRACED_TABLES, Reals, Replay, TracedSystem, real_of, trace
 from rigidsim.solve.effects.effect import registered_effects
 from rigidsim.solve.precision import precision_of

@@ -28,8 +28,7 @@ from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.paths import Path
 from rigidsim.scene.scene import Scene, build_scene
-from rigidsim.scene.tracing.arithmetic import TracingContext, swept_number
-from rigidsim.scene.tracing.numbers import BINARY, Graph, Traced, Untraceable
+from rigidsim.scene.tracing import BINARY, Graph, Traced, TracingContext, Untraceable, swept_number
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, prepare
 

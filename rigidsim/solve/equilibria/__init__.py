@@ -11,8 +11,7 @@ from typing import Any
 
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.starts import ATTITUDES, EQUILIBRIA, InitialRotation, StartForm, refusal, register_start
-from rigidsim.scene.tracing.arithmetic import TracingContext
-from rigidsim.scene.tracing.numbers import Untraceable
+from rigidsim.scene.tracing import TracingContext, Untraceable
 from rigidsim.solve.equilibria.cassini import cassini_state
 from rigidsim.solve.equilibria.relative import relative_equilibrium
 from rigidsim.solve.equilibria.search import NoEquilibrium

@@ -12,9 +12,9 @@ from typing import Any
 
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.effect_parts import EffectPart
-from rigidsim.scene.python_values import assignments_of
 from rigidsim.scene.registry import LOADS, names_of
 from rigidsim.scene.schema import Config
+from rigidsim.scene.toml_text import assignments_of
 
 _TITLES = {"loads": "", "rotors": "rotor ", "bodies": "attraction by the point mass "}
 """What tables of arrays are called before their names."""

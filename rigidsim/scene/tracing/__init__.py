@@ -1,1 +1,0 @@
-"""Tracing: numbers of a scene that is worked out once for all members of a sweep."""
