@@ -14,7 +14,7 @@ from typing import Any, TextIO
 
 from pydantic import ValidationError
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.scene import validation_messages as messages
 from rigidsim.scene.bodies.gravity_field import asked_degree, cut
 from rigidsim.scene.exact import ExactNumber
@@ -38,8 +38,7 @@ from rigidsim.scene.validation_errors import config_error
 Overrides = Sequence[str] | Mapping[str, Any]
 """Values to replace: ``KEY=VALUE`` texts, or dotted keys with Python values."""
 NEW = "the command rigidsim new lists commented ones to start from"
-_TIMES = "[time] times"
-_LARGEST_TABLE = 3_000_000  # bytes
+_LARGEST_TABLE = 3_000_000  # characters
 _LARGEST_FILE = 4_000_000  # bytes; a body of tens of thousands of points still fits
 
 
@@ -212,9 +211,7 @@ def validated(table: dict[str, Any], source: str) -> Config:
     try:
         config = model.model_validate(table, context=table)
     except ValidationError as error:
-        named = {problem.where for problem in problems}
-        found = config_error(model, table, error, {*NAME_OR_VECTOR, *LOADS["kind"]}).problems
-        problems += [problem for problem in found if problem.where not in named]
+        problems += config_error(model, table, error, {*NAME_OR_VECTOR, *LOADS["kind"]}).problems
     if problems:
         raise ConfigError(problems, source)
     return config
@@ -226,35 +223,27 @@ def load(path: str | Path, *, overrides: Overrides = ()) -> Experiment:
     Raises:
         ConfigError: no path is given, or the file is missing, not text, too large, or a bad config.
     """
-    if not isinstance(path, str | Path):
-        what = f"given {messages.shown(path)}; the path of a config is allowed (tables go to "
-        raise ConfigError(Problem("path", what + "run as they are, or to Experiment.from_dict)"))
+    what = f"given {messages.shown(path)}; the path of a config is allowed (tables go to run as they are, or "
+    ensure(isinstance(path, str | Path), ConfigError(Problem("path", what + "to Experiment.from_dict)")))
     path = Path(path)
+
+    def fault(what: str) -> ConfigError:
+        return ConfigError(Problem("file", what), str(path))
+
     if path.is_dir() and (path / "config.toml").is_file():
-        what = f"is a run folder; its config is {path / 'config.toml'}"
-        raise ConfigError(Problem("file", what), str(path))
+        raise fault(f"is a run folder; its config is {path / 'config.toml'}")
     try:
         size = path.stat().st_size
-        if size > _LARGEST_FILE:
-            raise ConfigError(
-                Problem("file", f"{size} bytes; a config has at most {_LARGEST_FILE}"), str(path)
-            )
+        ensure(size <= _LARGEST_FILE, fault(f"{size} bytes; a config has at most {_LARGEST_FILE}"))
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         hint = f"; {NEW}" if isinstance(error, FileNotFoundError) else ""
-        what = f"can't be read: {error.strerror or error}{hint}"
-        raise ConfigError(Problem("file", what), str(path)) from None
+        raise fault(f"can't be read: {error.strerror or error}{hint}") from None
     except UnicodeDecodeError as error:
-        raise ConfigError(
-            Problem("file", f"not UTF-8 text (byte {error.start}); save it as UTF-8"), str(path)
-        ) from None
-    return _with_tables(parse(text, source=str(path), overrides=overrides), path.parent)
-
-
-def _with_tables(experiment: Experiment, folder: Path) -> Experiment:
-    """The experiment with the texts of the tables that it names, so that it depends on no other file."""
+        raise fault(f"not UTF-8 text (byte {error.start}); save it as UTF-8") from None
+    experiment = parse(text, source=str(path), overrides=overrides)
     try:
-        added = _table_sections(experiment.config, folder)
+        added = _table_sections(experiment.config, path.parent)
     except ConfigError as error:
         raise error.at(experiment.source) from None
     if not added:
@@ -265,62 +254,56 @@ def _with_tables(experiment: Experiment, folder: Path) -> Experiment:
 
 
 def _table_sections(config: Config, folder: Path) -> str:
-    """TOML text, to be appended to the config, of tables that loads name and the config doesn't contain."""
-    found: dict[str, str] = {}
-    for where, name in _named(config):
-        if name not in found and name not in config.tables:
-            cutting = _times_of if where == _TIMES else None
-            found[name] = _section(name, _text(where, name, folder / name, cutting))
+    """TOML text, to be appended to the config, of tables that loads, sample times and a gravity field name
+    and the config doesn't contain, so that the experiment depends on no other file.
+    """
+    named: list[tuple[str, str, Callable[[TextIO], str]]] = []
+    if isinstance(config.time.times, str):
+        named.append(("[time] times", config.time.times, _times_of))
+    for number, one in enumerate(config.loads, 1):
+        orbit = getattr(one, "elements", None)
+        if orbit is not None and orbit.table is not None:
+            named.append((f"[[loads]] number {number} {orbit.key}.table", orbit.table, _whole))
     field = config.body.gravity_field
-    if field is not None and field.file is not None and field.file not in config.tables:
+    if field is not None and field.file is not None:
         degree = asked_degree(field, config.loads, config.sweep)
-        where, path = "[body] gravity_field file", folder / field.file
-        cut_field = partial(cut, degree=degree)
-        found[field.file] = _section(field.file, _text(where, field.file, path, cut_field, "text"))
+        named.append(("[body] gravity_field file", field.file, partial(cut, degree=degree)))
+    found: dict[str, str] = {}
+    for where, name, read in named:
+        if name not in found and name not in config.tables:
+            text = _text(where, name, folder / name, read).rstrip()
+            found[name] = f"\n[tables.{inline(name)}]\ntext = '''\n{text}\n'''\n"
     return "".join(found.values())
 
 
-def _named(config: Config) -> Iterator[tuple[str, str]]:
-    """Tables that loads and sample times name, with the place of each name in the config."""
-    if isinstance(config.time.times, str):
-        yield _TIMES, config.time.times
-    for number, load in enumerate(config.loads, 1):
-        orbit = getattr(load, "elements", None)
-        if orbit is not None and orbit.table is not None:
-            yield f"[[loads]] number {number} {orbit.key}.table", orbit.table
+def _text(where: str, name: str, path: Path, read: Callable[[TextIO], str]) -> str:
+    """What is read of a file."""
 
+    def fault(what: str) -> ConfigError:
+        return ConfigError(Problem(where, f'given "{name}"{what}'))
 
-def _text(
-    where: str, name: str, path: Path, cutting: Callable[[TextIO], str] | None = None, kind: str = "CSV"
-) -> str:
-    """Text of a file, or what is cut from it."""
+    what = f", which is a folder or a device: {path}; a file next to the config is allowed"
+    ensure(path.is_file() or not path.exists(), fault(what))
     try:
-        if path.exists() and not path.is_file():
-            what = (
-                f'given "{name}", which is a folder or a device: {path}; a file next to the config is allowed'
-            )
-            raise ConfigError(Problem(where, what))
         with path.open(encoding="utf-8-sig") as file:
-            if cutting is None:
-                _refuse_size(where, name, path.stat().st_size)
-                text = file.read()
-            else:
-                text = cutting(file)
-                _refuse_size(where, name, len(text))
+            text = read(file)
     except OSError as error:
-        what = (
-            f'given "{name}", which can\'t be read ({error.strerror or error}): {path} is looked for, next '
-        )
-        raise ConfigError(Problem(where, what + "to the config")) from None
-    except ValueError as error:
-        text_error = where != _TIMES or isinstance(error, UnicodeDecodeError)
-        told = f", which is not UTF-8 text; save it as {kind}" if text_error else f": {error}"
-        raise ConfigError(Problem(where, f'given "{name}"{told}')) from None
+        what = f", which can't be read ({error.strerror or error}): {path} is looked for, next to the config"
+        raise fault(what) from None
+    except UnicodeDecodeError:
+        raise fault(", which is not UTF-8 text; save it as such") from None
+    except ValueError as error:  # of a table without times
+        raise fault(f": {error}") from None
+    what = f", which has more than {_LARGEST_TABLE} characters; keep the rows and digits that the run needs"
+    ensure(len(text) <= _LARGEST_TABLE, fault(what))
     text = text.replace("\r\n", "\n").replace("\r", "\n")
-    if "'''" in text or any((ord(c) < 32 and c not in "\n\t") or ord(c) == 127 for c in text):
-        what = f'given "{name}", which holds characters that no table has; save it as plain {kind}'
-        raise ConfigError(Problem(where, what))
+    odd = "'''" in text or any((ord(c) < 32 and c not in "\n\t") or ord(c) == 127 for c in text)
+    ensure(not odd, fault(", which holds characters that no table has; save it as plain text"))
     return text
+
+
+def _whole(file: TextIO) -> str:
+    return file.read(_LARGEST_TABLE + 1)
 
 
 def _times_of(file: TextIO) -> str:
@@ -331,13 +314,3 @@ def _times_of(file: TextIO) -> str:
         return file
 
     return time_column(again)
-
-
-def _refuse_size(where: str, name: str, size: int) -> None:
-    if size > _LARGEST_TABLE:
-        what = f'given "{name}" of {size} bytes; a table has at most {_LARGEST_TABLE}: keep the rows and '
-        raise ConfigError(Problem(where, what + "digits that the run needs"))
-
-
-def _section(name: str, text: str) -> str:
-    return f"\n[tables.{inline(name)}]\ntext = '''\n{text.rstrip()}\n'''\n"
