@@ -68,7 +68,7 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
     "moment": [
         ("true", "given true", 'a number (in kg m^2), or a string such as "8.008e37 kg m^2", is allowed'),
         ("nan", "given nan; finite numbers are allowed"),
-        ('"2 kg m"', 'given "2 kg m"', "is not a unit of the dimension asked for, which is kg m^2"),
+        ('"2 kg m"', 'given "2 kg m"', 'a value in "kg m", where "kg m^2" is needed'),
     ],
     "part": [
         ('colour = "red"', "colour", "unknown key", "allowed: euler_angles"),
