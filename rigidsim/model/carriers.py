@@ -32,24 +32,29 @@ from rigidsim.scene.scene import Scene
 
 @runtime_checkable
 class Carrier(Protocol):
-    """A load that carries angular momentum relative to the body."""
+    """A load that carries angular momentum relative to the body, or stores energy: by default, neither."""
 
     def carried_momentum(self, m: Kinematics) -> list[Term]:
         """Its momentum h, body axes, in internal units of momentum."""
+        return []
 
     def carried_energy(self, m: Kinematics) -> Symbolic | None:
         """Its kinetic energy, internal units; None for none."""
+        return None
 
     def exerted_torque(self, m: Kinematics) -> list[Term]:
         """The torque -h' that it exerts on the body, body axes, in internal units of energy."""
+        return []
 
     def supplied_power(self, m: Kinematics) -> Symbolic | None:
         """The power that its drive feeds in, less what its friction takes, in internal units of energy over
         time; None if it keeps the energy.
         """
+        return None
 
     def carried_at_start(self, scene: Scene) -> tuple[Vector, Any]:
         """Its momentum (mpf, kg m^2/s, body axes) and kinetic energy (mpf, J) at the start."""
+        return [scene.context.zero] * 3, scene.context.zero
 
 
 def carried_beside(loads: Iterable[Load]) -> str:

@@ -19,8 +19,7 @@ import heyoka as hy
 from rigidsim.model.inertia import MassDistribution
 from rigidsim.model.load import Load, Term, force_terms, torque_terms
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.orbits.kepler_motion import KeplerParts
-from rigidsim.model.orbits.prescribed import OrbitStates
+from rigidsim.model.orbits.prescribed import KeplerParts, OrbitStates
 from rigidsim.model.scaling import choose_scaling, scaled_numbers
 from rigidsim.model.state_blocks import AttitudeStates, StateBlock
 from rigidsim.scene import attitude

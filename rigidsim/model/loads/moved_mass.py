@@ -18,13 +18,13 @@ from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model.carriers import Carrier
 from rigidsim.model.inertia import MassDistribution, absent
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.load import Load, Term, loads_of
+from rigidsim.model.load import Load, loads_of
 from rigidsim.model.names import written
 from rigidsim.model.own_states import driven, own_blocks
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import Expression, ExpressionError, evaluate, names_used, states_read
 from rigidsim.scene.initial_values import start_values
@@ -46,7 +46,7 @@ _LITTLE = 1e-6
 
 @register_load(body="principal_moments")
 @dataclass(frozen=True)
-class MovedMass(Load):
+class MovedMass(Load, Carrier):
     """The mass that moves; ``moments`` are numbers (mpf) or expressions, kg m^2."""
 
     moments: tuple[Any | Expression, ...]
@@ -117,19 +117,7 @@ class MovedMass(Load):
             found.append((f"the moment about {'xyz'[axis]} falls below {least:.1g} of their sum", margin))
         return found
 
-    # --- as a carrier of momentum: none of its own, but work ------------------------------------------------
-
-    def carried_momentum(self, m: Kinematics) -> list[Term]:
-        return []
-
-    def carried_energy(self, m: Kinematics) -> Symbolic | None:
-        return None
-
-    def exerted_torque(self, m: Kinematics) -> list[Term]:
-        return []
-
-    def carried_at_start(self, scene: Scene) -> tuple[Vector, Any]:
-        return [scene.context.zero] * 3, scene.context.zero
+    # --- as a carrier: of no momentum, but work -------------------------------------------------------------
 
     def supplied_power(self, m: Kinematics) -> Symbolic | None:
         """-w . I' w / 2, and what potential energies change by."""

@@ -6,7 +6,13 @@ anomaly E enters through c = cos E and s = sin E, which are states:
 
     E' = n / (1 - e c),   c' = -E' s,   s' = E' c,   r = a (1 - e c),
 
-and so do a moving node and periapsis, each as a pair that turns uniformly. (Kepler; Danby 1988, ch. 6.)
+and so do a moving node and periapsis, each as a pair that turns uniformly. (Kepler; Danby 1988, ch. 6.) In
+the plane of the orbit, in units of the semi-major axis, place, velocity and acceleration are, with b = sqrt(1
+- e^2),
+
+    (c - e, b s),    (-s, b c) E',    -(n / r)^2 (c - e, b s) / r.
+
+Turns by angles that move uniformly follow by the product rule, the same for expressions and for numbers.
 
 Between two rows of a table each element is a polynomial of u, the elapsed fraction of the interval:
 
@@ -14,15 +20,16 @@ Between two rows of a table each element is a polynomial of u, the elapsed fract
 
 with coefficients that are parameters of the compiled equations. Steps end at the rows, where the parameters
 of the next piece take over and the states are put on the values of the table (``TablePieces``): nothing adds
-up.
-The place on the orbit is the eccentric longitude K, carried by its cosine c and sine s as well:
+up. The place on the orbit is the eccentric longitude K, carried by its cosine c and sine s as well:
 
     K' = (l' + k' s - h' c) / (1 - k c - h s),    r = a (1 - k c - h s).
 
-(Equinoctial elements: Broucke & Cefalu 1972, Celestial Mechanics 5, 303.) An average over the orbit takes
-the elements alone, and what is added back to one the mean longitude, which enters nothing else: it is carried
+(Equinoctial elements: Broucke & Cefalu 1972, Celestial Mechanics 5, 303.) An average over the orbit takes the
+elements alone, and what is added back to one the mean longitude, which enters nothing else: it is carried
 from its start in a unit of which the whole table has less than one.
 """
+
+from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
@@ -34,7 +41,6 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.orbits.kepler_motion import KeplerParts
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder, Scaling
 from rigidsim.model.state_blocks import StateBlock
@@ -43,6 +49,101 @@ from rigidsim.scene.arithmetic import bits_in_use, cosine_and_sine
 from rigidsim.scene.kepler import regular_place
 from rigidsim.scene.orbit_tables.pieces import AXIS, LONGITUDE, TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
+
+Series = Sequence[Any]
+"""A quantity and its first two derivatives; None for one that is zero for good."""
+
+
+@dataclass(frozen=True)
+class KeplerParts:
+    """What the place on an orbit is made of.
+
+    Attributes:
+        motion: mean motion.
+        anomaly: cosine and sine of the eccentric anomaly.
+        inverse: semi-major axis over distance.
+        periapsis, node: cosine, sine and rate of the angle; a rate of None if it rests.
+        tilt: cosine and sine of the inclination.
+    """
+
+    eccentricity: Any
+    root: Any  # sqrt(1 - e^2)
+    motion: Any
+    anomaly: tuple[Any, Any]
+    inverse: Any
+    periapsis: tuple[Any, Any, Any]
+    node: tuple[Any, Any, Any]
+    tilt: tuple[Any, Any]
+
+    @classmethod
+    def at(cls, orbit: KeplerOrbit, context: Any, time: Any) -> KeplerParts:
+        """Those of a time in s; numbers are mpf, SI."""
+        e, anomaly = orbit.eccentricity, orbit.eccentric_anomaly(context, time)
+
+        def turned(angle: Any, rate: Any) -> tuple[Any, Any, Any]:
+            there = angle + rate * time
+            return *cosine_and_sine(context, there), None if rate == 0 else rate
+
+        return cls(
+            e,
+            context.sqrt(1 - e * e),
+            orbit.mean_motion,
+            cosine_and_sine(context, anomaly),
+            1 / (1 - e * context.cos(anomaly)),
+            turned(orbit.periapsis, orbit.periapsis_rate),
+            turned(orbit.ascending_node, orbit.node_rate),
+            cosine_and_sine(context, orbit.inclination),
+        )
+
+    def motions(self) -> tuple[list[Any], list[Any], list[Any]]:
+        """Place, velocity and acceleration, space axes, in units of the semi-major axis."""
+        (c, s), pace = self.anomaly, self.motion * self.inverse
+        along, across = c - self.eccentricity, self.root * s
+        drawn = -(pace * pace * self.inverse)
+        x: Series = [along, -(pace * s), drawn * along]
+        y: Series = [across, self.root * (pace * c), drawn * across]
+        x, y = _turned(x, y, *self.periapsis)
+        tilted = [[None if a is None else factor * a for a in y] for factor in self.tilt]
+        x, y = _turned(x, tilted[0], *self.node)
+        zero = 0.0 * along
+        places = [[zero if a is None else a for a in each] for each in (x, y, tilted[1])]
+        return tuple(map(list, zip(*places, strict=True)))  # type: ignore[return-value]
+
+
+def _turned(x: Series, y: Series, c: Any, s: Any, rate: Any) -> tuple[Series, Series]:
+    """(c x - s y, s x + c y) for an angle of this rate."""
+    cosine, sine = [c, None, None], [s, None, None]
+    if rate is not None:
+        cosine, sine = [c, -(rate * s), -(rate * rate * c)], [s, rate * c, -(rate * rate * s)]
+    minus = [None if a is None else -a for a in sine]
+    return _sum(_product(cosine, x), _product(minus, y)), _sum(_product(sine, x), _product(cosine, y))
+
+
+def _product(a: Series, b: Series) -> Series:
+    """By Leibniz' rule."""
+    found = []
+    for parts in (((1, 0, 0),), ((1, 1, 0), (1, 0, 1)), ((1, 2, 0), (2, 1, 1), (1, 0, 2))):
+        terms = [
+            a[i] * b[j] if factor == 1 else 2.0 * (a[i] * b[j])
+            for factor, i, j in parts
+            if a[i] is not None and b[j] is not None
+        ]
+        found.append(_added(terms))
+    return found
+
+
+def _sum(a: Series, b: Series) -> Series:
+    return [_added([x for x in pair if x is not None]) for pair in zip(a, b, strict=True)]
+
+
+def _added(terms: list[Any]) -> Any:
+    if not terms:
+        return None
+    found = terms[0]
+    for x in terms[1:]:
+        found = found + x
+    return found
+
 
 _POWERS = 5  # of the polynomials; as many parameters for each element
 _LEAST = -5

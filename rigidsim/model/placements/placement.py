@@ -22,8 +22,8 @@ import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics, seconds
 from rigidsim.model.orbit_planes import OrbitPlane, ecliptic_plane
-from rigidsim.model.orbits.kepler_motion import KeplerParts
 from rigidsim.model.orbits.point_mass_states import PointMassPair, Pull
+from rigidsim.model.orbits.prescribed import KeplerParts
 from rigidsim.model.rotations import Symbolic, unit
 from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.epochs import Epoch
