@@ -4,11 +4,11 @@ import math
 import re
 import time
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -323,54 +323,49 @@ def warning_bits(codes: Iterable[str]) -> int:
     return sum(1 << WARNINGS.index(code) for code in set(codes))
 
 
-def warnings_variable(bits: np.ndarray) -> KeptVariable:
-    """Warnings of members, each a mask as in ``warning_bits``."""
-    attributes = {
+def plain_variables(
+    *, status: Any, warnings: Any, steps: Any, reached: Any, bound: Any, attitude_error: Any = None,
+    position_error: Any = None,
+) -> Kept:  # fmt: skip
+    """Variables that every member has, of (members,) each: indices in ``OUTCOMES``, masks as in
+    ``warning_bits``, and numbers; None for errors that aren't estimated, and for the position of a body
+    without one.
+    """
+    codes = np.array(status, dtype=np.int64)
+    labels = {
         "long_name": "warnings of the member, a bit each",
         "flag_masks": [1 << bit for bit in range(len(WARNINGS))],
         "flag_meanings": " ".join(WARNINGS),
     }
-    return KeptVariable((), bits, attributes)
-
-
-def plain_variables(
-    *,
-    steps: np.ndarray,
-    reached: np.ndarray,
-    bound: np.ndarray,
-    attitude_error: np.ndarray | None,
-    position_error: np.ndarray | None = None,
-    modelling: Modelling | None = None,
-) -> Kept:
-    """Variables that every member has besides its status, (members,) each; None for errors that aren't
-    estimated, and for the position of a body without one.
-    """
-    unknown = np.full(len(steps), np.nan)
+    error = np.full(len(codes), np.nan) if attitude_error is None else np.array(attitude_error, dtype=float)
+    text = "estimated error of the attitude at the last sample; nan where none is estimated"
     found = {
-        "steps": kept(steps.astype(np.int64), "1", "steps taken"),
-        "time_reached": kept(reached, "s", "time of the last sample"),
-        "drift_bound": kept(bound, "1", "relative drift that rounding alone explains"),
-        "attitude_error": kept(
-            unknown if attitude_error is None else attitude_error,
-            "rad",
-            "estimated error of the attitude at the last sample; nan where none is estimated",
-        ),
+        "status": status_variable(codes),
+        "warnings": KeptVariable((), np.array(warnings, dtype=np.int64), labels),
+        "steps": kept(np.array(steps, dtype=np.int64), "1", "steps taken"),
+        "time_reached": kept(np.array(reached), "s", "time of the last sample"),
+        "drift_bound": kept(np.array(bound), "1", "relative drift that rounding alone explains"),
+        "attitude_error": kept(error, "rad", text),
     }
     if position_error is not None:
-        told = "estimated error of the position at the last sample"
-        found["position_error"] = kept(position_error, "m", told)
-    if modelling is not None:
-        errors = {
-            "modelling_error": (modelling.worst, "directions", "rad"),
-            "modelling_error_norm": (modelling.angular_momentum_norm, "angular_momentum_norm, relative", "1"),
-            "modelling_error_energy": (modelling.energy, "energy of rotation, relative", "1"),
-        }
-        for name, (error, what, units) in errors.items():
-            if error is not None or name == "modelling_error":
-                value = np.array([np.nan if error is None else error])
-                told = f"largest error of the averaged model's {what} until the end"
-                found[name] = kept(value, units, told)
+        text = "estimated error of the position at the last sample"
+        found["position_error"] = kept(np.array(position_error), "m", text)
     return found
+
+
+def _modelling_errors(found: Modelling) -> Kept:
+    """Errors of an averaged model, of a single member."""
+    errors = {
+        "modelling_error": (found.worst, "directions", "rad"),
+        "modelling_error_norm": (found.angular_momentum_norm, "angular_momentum_norm, relative", "1"),
+        "modelling_error_energy": (found.energy, "energy of rotation, relative", "1"),
+    }
+    until = "largest error of the averaged model's {} until the end"
+    return {
+        name: kept(np.array([error], dtype=float), units, until.format(what))
+        for name, (error, what, units) in errors.items()
+        if error is not None or name == "modelling_error"
+    }
 
 
 @contextmanager
@@ -383,17 +378,10 @@ def naming_member(member: int) -> Iterator[None]:
         raise
 
 
-def run_alone(
-    run: Callable[[], MemoryRun],
-    keep: Sequence[str],
-    most_events: int,
-    events: Sequence[str],
-    more: Callable[[MemoryRun], Kept] | None = None,
-    hidden: str = "",
-) -> MemberResults:
+def run_alone(sweep: Sweep, member: int, keep: Sequence[str]) -> MemberResults:
     """Run one member by itself; a refusal or failure is recorded, and errors of the code are raised."""
     try:
-        result = run()
+        result = run(sweep.experiment_of(member), out=None)
     except ConfigError as error:
         return failed(Outcome.REFUSED, "; ".join(str(problem) for problem in error.problems))
     except RigidsimError as error:
@@ -402,73 +390,52 @@ def run_alone(
     assert isinstance(summary, Summary)
     if summary.status == Status.INTERRUPTED.value:
         raise KeyboardInterrupt
-    results = _kept_of_run(result, keep, hidden) | _events_of_run(result, keep, most_events, events)
-    bounds = [row.bound for row in summary.invariants.values()]
-    error_at_end = summary.accuracy.estimated_attitude_error
-    if summary.accuracy.certified is not None:
-        error_at_end = summary.accuracy.certified
-    results |= _ended(summary.status, summary.warning_codes)
     placed = summary.accuracy.estimated_position_error
-    results |= plain_variables(
-        steps=np.array([summary.cost.steps]),
-        reached=np.array([summary.time_reached]),
-        bound=np.array([max(bounds, default=np.nan)]),
-        attitude_error=None if error_at_end is None else np.array([error_at_end]),
-        position_error=None if placed is None else np.array([placed]),
-        modelling=summary.modelling,
+    results = _kept_of_run(sweep, result, keep) | plain_variables(
+        status=[OUTCOMES.index(summary.status)],
+        warnings=[warning_bits(summary.warning_codes)],
+        steps=[summary.cost.steps],
+        reached=[summary.time_reached],
+        bound=[max((row.bound for row in summary.invariants.values()), default=np.nan)],
+        attitude_error=[result.attitude_error],
+        position_error=None if placed is None else [placed],
     )
-    if more is not None and result.blocks:
-        results |= more(result)
+    if summary.modelling is not None:
+        results |= _modelling_errors(summary.modelling)
+    if "frequencies" in keep and result.blocks:
+        results |= frequencies_of(result)
     reasons = {} if summary.status in ENDED_WELL else {0: summary.message}
     spent = sum(summary.cost.cpu_by_phase.get(phase, 0.0) for phase in _ESTIMATING)
     return MemberResults(results, reasons, {"alone": 1}, estimating=spent)
 
 
-def _ended(status: str, warnings: Iterable[str]) -> Kept:
-    """Status and warnings of a single member."""
-    return {
-        "status": status_variable(np.array([OUTCOMES.index(status)], dtype=np.int64)),
-        "warnings": warnings_variable(np.array([warning_bits(warnings)], dtype=np.int64)),
-    }
-
-
 def failed(outcome: Outcome, reason: str) -> MemberResults:
     """Results of a member that gave no samples."""
-    nothing = np.array([np.nan])
-    found = _ended(outcome.value, [])
-    found |= plain_variables(steps=np.array([0]), reached=nothing, bound=nothing, attitude_error=nothing)
+    code, nothing = OUTCOMES.index(outcome.value), [np.nan]
+    found = plain_variables(status=[code], warnings=[0], steps=[0], reached=nothing, bound=nothing)
     return MemberResults(found, {0: reason}, {"alone": 1})
 
 
-def _kept_of_run(result: MemoryRun, keep: Sequence[str], hidden: str) -> Kept:
-    if not result.blocks:
-        return {}
-    series, times = [], np.zeros(0)
-    for variable in result.variables:
-        if variable.name == "time":
-            times = np.reshape(joined_parts(result.blocks, variable)[0], -1)
-        if variable.name == "time" or "units" not in variable.attributes or variable.name in _DATES:
-            continue
-        parts = [
-            part.reshape(1, -1, max(1, int(np.prod(variable.shape))))
-            for part in joined_parts(result.blocks, variable)
-        ]
-        series.append(MemberSeries(variable, parts))
-    return kept_of_series(series, times, np.array([len(times)]), keep, hidden)
-
-
-def _events_of_run(result: MemoryRun, keep: Sequence[str], most_events: int, events: Sequence[str]) -> Kept:
+def _kept_of_run(sweep: Sweep, result: MemoryRun, keep: Sequence[str]) -> Kept:
     found: Kept = {}
-    recorded = {v.name: v for v in result.variables if "drift_of" not in v.attributes and v.name != "time"}
-    for name in events:
-        extras = {extra.name: extra for extra in result.extras}
-        times = extras[f"{name}_time"].values
+    named = {variable.name: variable for variable in result.variables}
+    shown = [v for v in named.values() if "units" in v.attributes and v.name not in ("time", *_DATES)]
+    if result.blocks:
+        times = joined_parts(result.blocks, named["time"])[0].reshape(-1)
+        series = [
+            MemberSeries(v, [part.reshape(1, len(times), -1) for part in joined_parts(result.blocks, v)])
+            for v in shown
+        ]
+        found |= kept_of_series(series, times, np.array([len(times)]), keep, sweep.added)
+    extras = {extra.name: extra.values for extra in result.extras}
+    for event in sweep.base.config.events:
         points = {
-            what: (variable, [extras[f"{name}_{what}"].values])
-            for what, variable in recorded.items()
-            if f"{name}_{what}" in extras and variable.name not in _DATES
+            v.name: (v, [extras[f"{event.name}_{v.name}"]])
+            for v in shown
+            if f"{event.name}_{v.name}" in extras and v.name != sweep.added
         }
-        found |= kept_events(name, [times], most_events, points, keep)
+        when = [extras[f"{event.name}_time"]]
+        found |= kept_events(event.name, when, sweep.table.most_events, points, keep)
     return found
 
 
@@ -639,17 +606,16 @@ class BatchTiles:
         """Results of those members of a block that are ``done``."""
         sweep = self._sweep
         kept = _kept(block, compiled.variables, keep, sweep.table.most_events, sweep.added)
-        codes = [-1 if status is None else OUTCOMES.index(status.value) for status in block.status]
-        kept["status"] = status_variable(np.array(codes, dtype=np.int64))
         over = block.largest_drifts().max(axis=0) > block.drift_bound
         warned = {WarningCode.DRIFT: over, WarningCode.UNDEFINED: _lost(block)}
         if errors is not None:
             gone = WarningCode.RATES_UNCERTAIN if errors.attitude is None else WarningCode.ATTITUDE_UNCERTAIN
             warned[gone] = errors.uncertain
         bits = [np.where(found, warning_bits([code.value]), 0) for code, found in warned.items()]
-        kept["warnings"] = warnings_variable(np.bitwise_or.reduce(bits))
         rows = np.maximum(block.reached - 1, 0)
         kept |= plain_variables(
+            status=[-1 if status is None else OUTCOMES.index(status.value) for status in block.status],
+            warnings=np.bitwise_or.reduce(bits),
             steps=block.steps,
             reached=np.where(block.reached > 0, block.times[rows], np.nan),
             bound=block.drift_bound,
@@ -774,8 +740,6 @@ def run_members(
     sweep: Sweep, members: Sequence[int], keep: Sequence[str], alone: bool | None = None
 ) -> MemberResults:
     """Run some members of a sweep and keep the items asked for; ``alone``: see ``Begun``."""
-    events = [event.name for event in sweep.base.config.events]
-    more = frequencies_of if "frequencies" in keep else None
     parts: list[Part] = []
     left, why = list(range(len(members))), why_alone(sweep, keep)
     if not why:
@@ -783,10 +747,8 @@ def run_members(
             members, keep, alone
         )
     for place in left:
-        member = partial(lambda member: run(sweep.experiment_of(member), out=None), members[place])
         with naming_member(members[place]):
-            found = run_alone(member, keep, sweep.table.most_events, events, more, sweep.added)
-        parts.append((np.array([place]), found))
+            parts.append((np.array([place]), run_alone(sweep, members[place], keep)))
     return MemberResults.together(parts, why)
 
 
