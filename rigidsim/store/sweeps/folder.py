@@ -92,10 +92,10 @@ class SweepFolder(WorkFolder):
         except FileNotFoundError:
             if not any(self.tiles.glob("g*.json")) or self.dataset.exists():
                 return None
-            why = "begun by a version of rigidsim that this one can't go on with"
+            why = "was begun by a version of rigidsim that this one can't go on with"
         except (OSError, ValueError) as error:
-            why = f"damaged ({str(error).splitlines()[0]})"
-        raise RunFolderError(f"{self.note}: is {why}; {FORCE} runs all members again")
+            why = f"is damaged ({str(error).splitlines()[0]})"
+        raise RunFolderError(f"{self.note}: {why}; {FORCE} runs all members again")
 
     def begin(self, begun: Begun) -> None:
         """Write what is begun with. Several processes that share a sweep write the same."""
