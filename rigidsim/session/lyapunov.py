@@ -45,7 +45,7 @@ def _save(path: Path, done: Convergence, run_id: str) -> None:
     buffer = io.BytesIO()
     with netcdf.writing(buffer) as file:
         file.attributes(labels)
-        file.group("lyapunov", done.arrays())
+        file.group("lyapunov", done)
     content = sealed(buffer)
     try:
         atomic.write_bytes(path, content)
@@ -67,7 +67,7 @@ def _saved(path: Path, run_id: str) -> Convergence | None:
         with netcdf.reading(path) as file:
             if str(file.attrs.get("run_id", "")) != run_id:
                 return None
-        return Convergence.from_arrays(netcdf.read_group(path, "lyapunov"))
+        return netcdf.read_group(path, "lyapunov")
     except (RunFolderError, KeyError):
         return None
 

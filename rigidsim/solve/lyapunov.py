@@ -12,8 +12,8 @@ that drive it without feeling it (the position on an orbit), which stand for an 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import heyoka as hy
 import numpy as np
@@ -54,32 +54,10 @@ class LyapunovSpectrum:
         return self.largest * duration > 2 * regular + 3
 
 
-@dataclass
-class Convergence:
-    """Progress of a spectrum, float64, to be resumed with the same bits; empty at the start."""
-
-    number: int = 0
-    place: np.ndarray = field(default_factory=lambda: np.zeros(0))  # state and tangents
-    sums: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    times: list[float] = field(default_factory=list)
-    exponents: list[np.ndarray] = field(default_factory=list)
-    turns: np.ndarray = field(default_factory=lambda: np.zeros(0))
-
-    def arrays(self) -> dict[str, np.ndarray]:
-        """The arrays to be saved."""
-        return {one.name: np.atleast_1d(np.asarray(getattr(self, one.name))) for one in fields(self)}
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, np.ndarray]) -> Convergence:
-        """The progress saved as arrays; empty arrays may be missing."""
-        return cls(
-            int(arrays["number"][0]),
-            arrays["place"],
-            arrays["sums"],
-            [float(t) for t in arrays.get("times", ())],
-            list(arrays.get("exponents", ())),
-            arrays.get("turns", np.zeros(0)),
-        )
+Convergence = dict[str, np.ndarray]
+"""Progress of a spectrum, to be resumed with the same bits: ``number`` of intervals, ``place`` (state and
+tangents), ``turns``, ``sums`` of logarithms, and ``times`` and ``exponents`` so far.
+"""
 
 
 def lyapunov_spectrum(
@@ -91,19 +69,28 @@ def lyapunov_spectrum(
 ) -> LyapunovSpectrum | None:
     """Integrate the variational equations, while ``go_on`` says so; None if ended early or lost."""
     moving = motion_states(system)
-    states, count = len(system.states), len(moving)
+    count = len(moving)
     tangents = interruptible(
         lambda: Tangents(Derivatives.of(system), moving, count, precision_of("double"), compact_mode=True)
     )
     intervals = max(1, math.ceil((end - start) / _INTERVAL))
     stride = max(1, math.ceil(intervals / _MOST_ROWS))
-    if done is None or done.place.size != states + count * count:
-        initial = [*map(float, system.initial), *np.eye(count).ravel()]
-        done = Convergence(place=np.array(initial), sums=np.zeros(count))
-    begun = start + (end - start) * done.number / intervals
+    begun = {
+        "number": np.zeros(1, dtype=np.int64),
+        "place": np.array([*map(float, system.initial), *np.eye(count).ravel()]),
+        "turns": np.zeros(0),
+        "sums": np.zeros(count),
+        "times": np.zeros(0),
+        "exponents": np.zeros((0, count)),
+    }
+    # of arrays that are empty none may have been saved
+    fits = done is not None and "place" in done and done["place"].shape == begun["place"].shape
+    done = begun | (done if done is not None and fits else {})
+    first = int(done["number"][0])
+    time = start + (end - start) * first / intervals
     none = np.zeros(count, dtype=np.int64)
-    tangents.begin(Place((begun, 0.0), done.place, none, turns=tuple(done.turns.tolist())))
-    for number in range(done.number + 1, intervals + 1):
+    tangents.begin(Place((time, 0.0), done["place"], none, turns=tuple(done["turns"].tolist())))
+    for number in range(first + 1, intervals + 1):
         time = start + (end - start) * number / intervals
         try:
             state, grown = tangents.to(time, lambda: go_on(done))
@@ -111,17 +98,18 @@ def lyapunov_spectrum(
             return None
         basis, triangle = np.linalg.qr(grown.T)
         lengths = np.abs(np.diag(triangle))
-        done.sums = done.sums + np.log(np.maximum(lengths, np.finfo(float).tiny))
+        done["sums"] = done["sums"] + np.log(np.maximum(lengths, np.finfo(float).tiny))
         tangents.restart(state, basis.T)
         if number % stride == 0 or number == intervals:
-            done.times.append(math.ldexp(time - start, system.scaling.time))
-            done.exponents.append(np.sort(done.sums)[::-1] / done.times[-1])
-        done.number, done.place = number, tangents.here.state
-        done.turns = np.array(tangents.here.turns)
+            done["times"] = np.append(done["times"], math.ldexp(time - start, system.scaling.time))
+            latest = np.sort(done["sums"])[::-1] / done["times"][-1]
+            done["exponents"] = np.vstack([done["exponents"], latest])
+        done["number"], done["place"] = np.array([number]), tangents.here.state
+        done["turns"] = np.array(tangents.here.turns, dtype=float)
         if not go_on(done):
             return None
     names = tuple(system.states[i] for i in moving)
-    return LyapunovSpectrum(np.array(done.times), np.array(done.exponents), names)
+    return LyapunovSpectrum(done["times"], done["exponents"], names)
 
 
 def motion_states(system: System) -> list[int]:

@@ -101,7 +101,7 @@ timeline = false
 
         def interrupted(system, start, end, go_on, done=None):
             def some(progress):
-                seen.append(progress.number)
+                seen.append(int(progress["number"][0]))
                 interruption.requested = interruption.requested or len(seen) in (5, 11)
                 return go_on(progress)
 
