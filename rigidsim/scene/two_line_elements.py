@@ -80,7 +80,8 @@ def _epoch(lines: tuple[str, ...]) -> Epoch:
         raise _refused(lines, f"line 1 is for day {text} of {year}; days from 1 to {days} are allowed")
     day = date(year, 1, 1).toordinal() + int(whole) - 1
     if day < UTC_BEGIN:
-        raise _refused(lines, f"line 1 is for {date.fromordinal(day)}; dates from 1960 on (UTC) are allowed")
+        what = f"line 1 is for {date.fromordinal(day)}; dates from 1960-01-01 on, when UTC began, are allowed"
+        raise _refused(lines, what)
     return Epoch("UTC", day, int(decimals) * 86400 * _TICKS // 10 ** len(decimals))
 
 
