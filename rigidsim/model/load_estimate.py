@@ -35,7 +35,7 @@ from rigidsim.scene.arithmetic import apply, transpose
 from rigidsim.scene.expressions.tree import names_used, readables
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.surfaces import surfaces_of
+from rigidsim.scene.surfaces import Surfaces
 
 _TIMES = 2048  # over the run
 _LARGEST = 1e100  # largest torque or force in internal units that is considered
@@ -65,7 +65,9 @@ Function = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Of times (n,) and states (names, n) to values (expressions, n), internal units."""
 
 
-def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requirements) -> Drive | None:
+def estimate_drive(
+    scene: Scene, loads: Sequence[Load], requirements: Requirements, surfaces: Surfaces
+) -> Drive | None:
     """Estimate of what these loads, whose size is unknown, can add to the motion; None without any.
 
     Raises:
@@ -74,7 +76,7 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
     """
     if not loads:
         return None
-    trial = _Trial(scene, requirements, loads)
+    trial = _Trial(scene, requirements, surfaces, loads)
     if requirements.attitude:
         trial.refuse_odd()
     return trial.drive()
@@ -82,7 +84,7 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
 
 def effect_at_start(plan: ModelPlan, loads: Sequence[Load]) -> list[tuple[str, float, str]]:
     """Torque and force of loads together at the start: what it is, its size and its unit."""
-    trial = _Trial(plan.scene, plan.requirements, plan.loads, loads)
+    trial = _Trial(plan.scene, plan.requirements, plan.surfaces, plan.loads, loads)
     unit, mass, context = trial.m.scaling, plan.scene.body.mass, plan.scene.context
     begin = np.array([float(context.ldexp(plan.scene.start, -unit.time))])
     values = trial.whole(begin, trial.start[:, None])
@@ -167,10 +169,15 @@ class _Trial:
     """
 
     def __init__(
-        self, scene: Scene, requirements: Requirements, loads: Sequence[Load], among: Sequence[Load] = ()
+        self,
+        scene: Scene,
+        requirements: Requirements,
+        surfaces: Surfaces,
+        loads: Sequence[Load],
+        tried: Sequence[Load] = (),
     ) -> None:
         m = self.m = probe(scene, requirements, loads)
-        self._tried = among or loads
+        self._tried = tried or loads
         carriers = [x for x in loads_of(scene) if isinstance(x, Carrier)]  # whose states any load may read
         self.names, self.start = start_of(m, [*loads, *(x for x in carriers if x not in loads)])
         self._carriers: list[Any] = [load for load in self._tried if isinstance(load, Carrier)]
@@ -181,7 +188,7 @@ class _Trial:
         kinds, self._exerts = (self.torques, exerted, self.forces), any(exerted)
         sums = [x for terms in kinds for x in _sums(chain(*terms))]
         self._parts = [x for terms in zip(*kinds, strict=True) for x in _sums(chain(*terms))]
-        in_time = (s.expression for s in surfaces_of(scene).found if names_used(s.expression) == {"t"})
+        in_time = (s.expression for s in surfaces.found if names_used(s.expression) == {"t"})
         narrow = [u for load in self._tried for u in load.narrow(m)] + written(m, in_time)
         zeros = [y for u in narrow for y in (u, _by_time(u))]
         self._all = self._compiled([*sums, *map(_by_time, sums), *zeros, *self._parts])

@@ -68,19 +68,19 @@ def plan_model(
         refuse_second_orbits(scene, loads)
         refuse_same_sources(scene.config.loads, scene.config.body.host)
     formulation, requirements = _choose_formulation(scene, loads, along)
+    surfaces = surfaces_of(scene)
     if scaling is None and like is not None:
         scaling = choose_scaling(scene, like.scaling.drive)
     elif scaling is None:
         unknown = [x for x in loads if formulation.resolves_rotation and x.amplitude(scene) is None]
         refuse_odd_states(scene)
-        scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements))
+        scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements, surfaces))
     if scene.states and not scaling.own:
         known = None if like is None else like.scaling.own
         scaling = replace(scaling, own=own_units(scene, scaling, known))
     if not formulation.carries_rates:
         scaling = replace(scaling, rates=(0, 0, 0))
     tabulated = [(str(number), load.table) for number, load in enumerate(loads_of(scene), start=1)]
-    surfaces = surfaces_of(scene)
     first = surfaces.parameters if formulation.resolves_rotation else 0
     tables = places_of([(tag, x) for tag, x in tabulated if x is not None], formulation.longitude, first)
     piecewise = bool(tables) or any(load.sights for load in scene.loads)
