@@ -196,7 +196,7 @@ PLATE = {"normal": ("0", "0", "1"), "area": "1"}
 NONSENSE = [
     ([], "", "", "body without surfaces"),
     ([{"specular": "0.5"}], "", "", "none of its forms"),
-    ([{"normal": ("0", "0", "1")}], "", "", "missing; a plate needs its area"),
+    ([{"normal": ("0", "0", "1")}], "", "", "missing area; a plate needs its normal and its area"),
     ([PLATE | {"specular": "0.7", "diffuse": "0.4"}], "", "", "at most 1"),
     ([PLATE], 'light = "sun"', 'light = "moon"', "which is no source; sources of this scene: sun"),
 ]

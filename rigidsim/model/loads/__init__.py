@@ -1,4 +1,4 @@
-"""The loads, one file each; importing this package registers all of their kinds."""
+"""The loads; importing this package registers all of their kinds."""
 
 from __future__ import annotations
 
