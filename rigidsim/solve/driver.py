@@ -4,7 +4,6 @@ Many steps are taken in one call: without samples while the next one is far, els
 them. Steps are never shortened for a sample, and no bit depends on how many are taken at once.
 """
 
-import math
 import time
 
 from rigidsim.solve.corrected_stepper import CorrectedStepper
@@ -202,10 +201,13 @@ class Driver:
 
     def _take(self, count: int, boundary: Mark) -> bool:
         """Take steps up to corrections, and the samples within them."""
-        stepper, buffer = self.stepper, self.buffer
+        stepper, buffer, left = self.stepper, self.buffer, self.corrected.left
+        if count > left:  # the rest of a stride would be taken without a grid
+            count -= (count - left) % self.corrected.stride
         while count > 0:
             part, before, started = min(count, self.corrected.left), stepper.steps, time.perf_counter()
-            samples = SamplesWithin(buffer.ahead(float(stepper.time) + (2 * part * self._length or math.inf)))
+            far = float(stepper.time) + 2 * part * self._length if self._length else None
+            samples = SamplesWithin(buffer.ahead(far))
             if not stepper.take(part, samples) or stepper.unresolved:
                 return self._lost(boundary, part)
             self._note_sizes()

@@ -119,14 +119,17 @@ class SampleBuffer:
         return self.ahead(None)[0]
 
     def ahead(self, far: float | None) -> np.ndarray:
-        """Times of the next samples (n,), n > 0, up to the first past a time, as many as may wait."""
-        first, times = self._times
+        """Times of the next samples (n,), n > 0, up to the first past a time if one is given; as many as may
+        wait, or where steps are cheap as many as memory holds, so that strides of steps aren't cut.
+        """
+        (first, times), cheap = self._times, self._rows.clock.precision.cheap
         if not first <= self.count < first + len(times):
-            first, rows = self.count, self._pacing.rows_at_once
+            first, rows = self.count, self._pacing.rows_waiting if cheap else self._pacing.rows_at_once
             times = self._rows.internal(first, min(first + rows, self._rows.count))
             self._times = first, times
-        room = max(self._most - (self.count - self.handed), 1)
-        times = times[self.count - first : self.count - first + room]
+        times = times[self.count - first :]
+        if far is None or not cheap:
+            times = times[: max(self._most - (self.count - self.handed), 1)]
         return times if far is None else times[: bisect_right(times, far, key=float) + 1]
 
     def take(self, block: SampleBlock, boundary: Mark) -> None:
