@@ -17,8 +17,7 @@ from rigidsim.scene.arithmetic import Vector, apply, dot, hansen, norm
 from rigidsim.scene.bodies.presets import KNOWN, KnownBody, known_body
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.orbit_keys import PACES, Elements
-from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.orbits import MEAN_MOTION_KEYS, Elements, KeplerOrbit
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.readable import span_text
 from rigidsim.scene.registry import LoadFields
@@ -229,7 +228,7 @@ def _about_period(
     table: Elements, orbit: KeplerOrbit, strength: ExactNumber, where: str, scene: Scene
 ) -> Iterator[Caution]:
     """A pace that no mass explains: that of the source, and the body's as far as it is known."""
-    key = next((key for key in PACES if getattr(table, key) is not None), None)
+    key = next((key for key in MEAN_MOTION_KEYS if getattr(table, key) is not None), None)
     if key is None or orbit.mean_motion == 0:
         return
     needed, least = float(orbit.mean_motion**2 * orbit.semi_major_axis**3), float(strength)
@@ -302,7 +301,7 @@ def _near_resonance(
             f"orbit of {where} ({_turn(expected)}), which holds {100 * width / expected:.2g} %; the mean "
             f"anomaly returns after {_turn(motion)}, the mean longitude after {_turn(longitude)}"
         )
-        pace = next((key for key in PACES if getattr(table, key) is not None), "")
+        pace = next((key for key in MEAN_MOTION_KEYS if getattr(table, key) is not None), "")
         if pace in ("", "period"):
             told = "period" if pace else "the one of Kepler's third law"
             text += f": {told} is anomalistic; give sidereal_period if a sidereal month or year is meant"

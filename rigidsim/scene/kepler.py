@@ -10,11 +10,31 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from pydantic import Field
 
 from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.exact import ZERO
+from rigidsim.scene.fields import Angle, ConfigTable, Eccentricity, Metre, Positive
 
 Pair = tuple[Any, Any]
 """Cosine and sine of an angle."""
+
+
+class Ellipse(ConfigTable):
+    """Keys of a Kepler orbit, whose elements are classical ones in space axes."""
+
+    semi_major_axis: Positive[Metre] | None = Field(None, examples=["7000 km"])
+    """semi-major axis of the ellipse"""
+    eccentricity: Eccentricity = ZERO
+    """0 to below 1"""
+    inclination: Angle = Field(ZERO, examples=["51.6 deg"])
+    """inclination to the XY plane of the space axes"""
+    ascending_node: Angle = ZERO
+    """longitude of the ascending node from X, at time 0"""
+    periapsis: Angle = ZERO
+    """argument of periapsis from the ascending node, at time 0"""
+    mean_anomaly: Angle = ZERO
+    """mean anomaly at time 0"""
 
 
 def plane_vectors(tilt: Pair, node: Pair, periapsis: Pair) -> tuple[Vector, Vector]:

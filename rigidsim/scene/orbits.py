@@ -1,22 +1,111 @@
-"""Prescribed orbits worked out, by Kepler's laws or by a table."""
+"""Prescribed orbits, from the side of the attracting body or of the body, as keys and worked out: by Kepler's
+laws or by a table.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, ClassVar
 
+from pydantic import Field, StrictStr
+
+from rigidsim.errors import ensure
 from rigidsim.scene.arithmetic import cosine_and_sine, eccentric_anomaly
-from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.kepler import combined, plane_vectors
-from rigidsim.scene.orbit_keys import PACES, Elements, Orbit
+from rigidsim.scene.exact import ZERO, ExactNumber
+from rigidsim.scene.fields import Positive, Rate, Rule, Second, excludes, one_of
+from rigidsim.scene.kepler import Ellipse, combined, plane_vectors
 from rigidsim.scene.orbit_tables.elements import read_table
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
-from rigidsim.scene.registry import Setting
+from rigidsim.scene.registry import LoadFields, Setting
 from rigidsim.scene.text_tables import TableError
 from rigidsim.scene.tracing import Traced, TracedExact, Untraceable
 from rigidsim.scene.validation_messages import nearest
+
+MEAN_MOTION_KEYS = ("period", "sidereal_period", "longitude_rate")
+"""Keys of which one may replace the mean motion of Kepler's third law."""
+
+
+class Elements(Ellipse):
+    """A Kepler orbit, whose node and periapsis may move uniformly.
+
+    Angles are those at time zero of the scene, as classical elements in space axes. One of ``period``,
+    ``sidereal_period`` and ``longitude_rate`` may replace the mean motion of Kepler's third law. A ``table``
+    gives elements over time; those that it hasn't are constant.
+
+    Attributes:
+        key: of a load, that this table is.
+        opposite: whether the elements place the body as seen from the source.
+    """
+
+    key: ClassVar[str]
+    opposite: ClassVar[bool] = False
+    rules: ClassVar[tuple[Rule, ...]] = (
+        one_of(*MEAN_MOTION_KEYS, least=0),
+        excludes("table", "node_rate", "periapsis_rate"),
+    )
+
+    table: StrictStr | None = Field(None, examples=["mars_elements.csv"])
+    """name of a CSV file next to the config, with elements over time"""
+    node_rate: Rate = Field(ZERO, examples=["-19.3 deg/yr"])
+    """rate of the ascending node"""
+    periapsis_rate: Rate = ZERO
+    """rate of the argument of periapsis"""
+    period: Positive[Second] | None = Field(None, examples=["27.55455 day"])
+    """anomalistic period, from periapsis to periapsis, of the mean anomaly (with a table without one, of the
+    mean longitude); by default by Kepler's third law
+    """
+    sidereal_period: Positive[Second] | None = Field(None, examples=["27.321661 day"])
+    """period of the mean longitude (node + periapsis + mean anomaly), such as a sidereal month or year,
+    instead of period
+    """
+    longitude_rate: Positive[Rate] | None = Field(None, examples=["13.17639648 deg/day"])
+    """rate of the mean longitude (node + periapsis + mean anomaly), instead of period"""
+
+
+class Orbit(Elements):
+    """Where the attracting body is, as seen from the body: by a Kepler orbit, or as one of [[bodies]]."""
+
+    key = "orbit"
+    rules = (*Elements.rules, excludes("body", *Elements.model_fields))
+
+    body: StrictStr | None = Field(None, examples=["sun"])
+    """name of the attracting point mass in [[bodies]]; excludes all other keys"""
+
+
+class SatelliteOrbit(Elements):
+    """The body's own Kepler orbit about the attracting body, which is seen on the opposite side."""
+
+    key, opposite = "satellite_orbit", True
+
+
+SIDES = (
+    "orbit is the place of the source as seen from the body, satellite_orbit the body's own orbit about the "
+    "source"
+)
+
+
+class OrbitFields(LoadFields):
+    """Keys of a load whose source and body are on a prescribed orbit, which is given from either side."""
+
+    rules: ClassVar[tuple[Rule, ...]] = (one_of("orbit", "satellite_orbit", least=0, why=SIDES),)
+
+    orbit: Orbit | None = Field(
+        default=None,
+        description="place of the source as seen from the body, by elements: a satellite's source is "
+        "opposite to the satellite's own elements, which are satellite_orbit",
+        examples=[{"semi_major_axis": "1 au", "eccentricity": 0.0167}],
+    )
+    satellite_orbit: SatelliteOrbit | None = Field(
+        default=None,
+        description="the body's own elements about the source, with the keys of orbit, instead of orbit",
+        examples=[{"semi_major_axis": "7000 km", "inclination": "51.6 deg"}],
+    )
+
+    @property
+    def elements(self) -> Orbit | SatelliteOrbit | None:
+        """The one of both that is given."""
+        return self.satellite_orbit if self.orbit is None else self.orbit
 
 
 @dataclass(frozen=True)
@@ -84,49 +173,45 @@ class KeplerOrbit:
 
 def attracting_body(orbit: Orbit, around: Setting) -> int:
     """Index of the point mass that an orbit names."""
-    masses = around.bodies
-    names = () if masses is None else masses.names
-    if masses is None or orbit.body not in names:
-        allowed = ", ".join(names) or "none, since there are no [[bodies]]"
-        what = f'given "{orbit.body}"{nearest(str(orbit.body), names)}; allowed: {allowed}'
-        raise around.fault("orbit.body", what)
-    found = names.index(orbit.body)
-    if found == masses.host:
-        raise around.fault("orbit.body", f'given "{orbit.body}", which is the body itself; name another')
+    names = () if around.bodies is None else around.bodies.names
+    allowed = ", ".join(names) or "none, since there are no [[bodies]]"
+    what = f'given "{orbit.body}"{nearest(str(orbit.body), names)}; allowed: {allowed}'
+    ensure(orbit.body in names, around.fault("orbit.body", what))
+    found = names.index(str(orbit.body))
+    what = f'given "{orbit.body}", which is the body itself; name another'
+    ensure(found != around.carried_bodies.host, around.fault("orbit.body", what))
     return found
 
 
-def pace_of(table: Elements) -> tuple[str, ExactNumber] | None:
+def _rate_given(table: Elements) -> tuple[str, ExactNumber] | None:
     """The key that replaces the mean motion of Kepler's third law, and its value; None if none is given."""
-    given = ((key, getattr(table, key)) for key in PACES)
+    given = ((key, getattr(table, key)) for key in MEAN_MOTION_KEYS)
     return next(((key, value) for key, value in given if value is not None), None)
 
 
-def rate_of(pace: tuple[str, ExactNumber], context: Any) -> Any:
+def _rate_meant(pace: tuple[str, ExactNumber], context: Any) -> Any:
     """The rate (mpf, rad/s) that a pace means, of the mean anomaly for a period, else of the longitude."""
     key, value = pace
     return value.at(context) if key == "longitude_rate" else 2 * context.pi / value.at(context)
 
 
-def mean_motion(table: Elements, strength: Any | None, around: Setting) -> Any:
+def _mean_motion(table: Elements, strength: Any | None, around: Setting) -> Any:
     """Rate of the mean anomaly (mpf, rad/s): that of the pace that was given, or of Kepler's third law if the
     gravitational parameter ``strength`` is known. Mean longitude is ascending node + periapsis + mean
     anomaly.
     """
-    context, pace = around.context, pace_of(table)
+    context, pace = around.context, _rate_given(table)
     if pace is None:
-        if strength is None:
-            what = "missing; give it, or gravitational_parameter for the one of Kepler's third law"
-            raise around.fault(f"{table.key}.period", what)
+        what = "missing; give it, or gravitational_parameter for the one of Kepler's third law"
+        ensure(strength is not None, around.fault(f"{table.key}.period", what))
         assert table.semi_major_axis is not None
         return context.sqrt(strength / table.semi_major_axis.at(context) ** 3)
-    rate = rate_of(pace, context)
+    rate = _rate_meant(pace, context)
     if pace[0] == "period":
         return rate
     motion = rate - table.node_rate.at(context) - table.periapsis_rate.at(context)
-    if not motion > 0:
-        what = f"less node_rate and periapsis_rate leaves the mean anomaly {context.nstr(motion, 8)} rad/s; "
-        raise around.fault(f"{table.key}.{pace[0]}", what + "a positive rate is allowed")
+    what = f"less node_rate and periapsis_rate leaves the mean anomaly {context.nstr(motion, 8)} rad/s; "
+    ensure(motion > 0, around.fault(f"{table.key}.{pace[0]}", what + "a positive rate is allowed"))
     return motion
 
 
@@ -138,7 +223,7 @@ def resolve_orbit(table: Elements, strength: Any | None, around: Setting) -> Kep
     if table.semi_major_axis is None:
         raise around.fault(f"{table.key}.semi_major_axis", "missing; it is needed")
     axis, eccentricity = table.semi_major_axis.at(context), table.eccentricity.at(context)
-    motion = mean_motion(table, strength, around)
+    motion = _mean_motion(table, strength, around)
     node, node_rate = table.ascending_node.at(context), table.node_rate.at(context)
     periapsis, periapsis_rate = table.periapsis.at(context), table.periapsis_rate.at(context)
     if table.opposite:
@@ -162,7 +247,7 @@ def resolve_orbit(table: Elements, strength: Any | None, around: Setting) -> Kep
 
 
 @lru_cache(64)  # loads of a scene with one table have one orbit
-def tabulated_orbit(
+def _tabulated_orbit(
     name: str,
     text: str,
     bits: int,
@@ -177,19 +262,16 @@ def tabulated_orbit(
     context = table.context
     given = dict(constants)
     for key in given:
-        if key in table.columns:
-            raise TableError(f"has a column {key}, which is given in the config, too; remove one of them")
-    if "semi_major_axis" not in table.columns and "semi_major_axis" not in given:
-        raise TableError("has no column semi_major_axis; add one, or give semi_major_axis with table")
-    paces = [(key, given.pop(key)) for key in PACES if key in given]
-    if paces:
-        rate = rate_of(paces[0], context)
-        motion: Callable[[Any], Any] = lambda axis: rate  # noqa: E731
-    elif strength is None:
-        raise TableError("needs a mean motion; give period with table")
-    else:
-        mass = context.make_mpf(strength)
-        motion = lambda axis: context.sqrt(mass / axis**3)  # noqa: E731
+        what = f"has a column {key}, which is given in the config, too; remove one of them"
+        ensure(key not in table.columns, TableError(what))
+    what = "has no column semi_major_axis; add one, or give semi_major_axis with table"
+    ensure("semi_major_axis" in {*table.columns, *given}, TableError(what))
+    rates = [_rate_meant((key, given.pop(key)), context) for key in MEAN_MOTION_KEYS if key in given]
+    ensure(rates or strength is not None, TableError("needs a mean motion; give period with table"))
+
+    def motion(axis: Any) -> Any:
+        return rates[0] if rates else context.sqrt(context.make_mpf(strength) / axis**3)
+
     columns = {key: value.at(context) for key, value in given.items()}
     orbit = TabulatedOrbit(name, table, columns, motion, opposite=opposite)
     _ = orbit.error
@@ -198,32 +280,24 @@ def tabulated_orbit(
 
 def resolve_tabulated_orbit(fields: Elements, strength: Any | None, around: Setting) -> TabulatedOrbit:
     """Work out a table's orbit; ``strength`` is the gravitational parameter of Kepler's law, if known."""
-    name = fields.table
-    assert name is not None
+    name, texts, context = str(fields.table), around.config.texts, around.context
     given = [(key, getattr(fields, key)) for key in sorted(fields.model_fields_set - {"table"})]
     if isinstance(strength, Traced) or any(isinstance(value, TracedExact) for _, value in given):
         raise Untraceable("an orbit by a table depends on it")
-    if name not in around.config.texts:
-        known = ", ".join(around.config.texts) or "none"
-        what = f'given "{name}", but this config was given as text, without files next to it; put the '
-        what += f'CSV into [tables."{name}"] text (there now: {known})'
-        raise around.fault(f"{fields.key}.table", what)
+    place = f"{fields.key}.table"
+    what = f'given "{name}", but this config was given as text, without files next to it; put the CSV into '
+    what += f'[tables."{name}"] text (there now: {", ".join(texts) or "none"})'
+    ensure(name in texts, around.fault(place, what))
     parts = None if strength is None else strength._mpf_
     constants = tuple((key, value) for key, value in given if value is not None)
     try:
-        orbit = tabulated_orbit(
-            name, around.config.texts[name], around.context.prec, constants, parts, fields.opposite
-        )
+        orbit = _tabulated_orbit(name, texts[name], context.prec, constants, parts, fields.opposite)
     except TableError as error:
-        raise around.fault(f"{fields.key}.table", f'given "{name}": {error}') from None
-    times = orbit.table.times
+        raise around.fault(place, f'given "{name}": {error}') from None
     start, end = sorted((around.start, around.end))
-    if not (times[0] <= start and end <= times[-1]):
-        ends = times[0], times[-1], start, end
-        first, last, start, end = (around.context.nstr(t, 8) for t in ends)
-        what = (
-            f'given "{name}", which reaches from t = {first} s to {last} s, but the run goes from {start} s '
-        )
-        what += f"to {end} s; give more rows, or change [time] start or end"
-        raise around.fault(f"{fields.key}.table", what)
+    times = orbit.table.times
+    first, last, begin, until = (context.nstr(t, 8) for t in (times[0], times[-1], start, end))
+    what = f'given "{name}", which reaches from t = {first} s to {last} s, but the run goes from {begin} s '
+    what += f"to {until} s; give more rows, or change [time] start or end"
+    ensure(times[0] <= start and end <= times[-1], around.fault(place, what))
     return orbit

@@ -6,13 +6,11 @@ from typing import Any, ClassVar
 
 from pydantic import Field, StrictBool, StrictStr
 
-from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene.arithmetic import Vector, cross, eccentric_anomaly, norm
-from rigidsim.scene.exact import ZERO, ExactNumber
+from rigidsim.errors import ConfigError, Problem, ensure
+from rigidsim.scene.arithmetic import Vector, cross, eccentric_anomaly, minus, norm, plus, vector
+from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import (
-    Angle,
     ConfigTable,
-    Eccentricity,
     GravitationalParameter,
     Metre,
     Positive,
@@ -22,7 +20,7 @@ from rigidsim.scene.fields import (
     VariableName,
     excludes,
 )
-from rigidsim.scene.kepler import combined, plane_vectors
+from rigidsim.scene.kepler import Ellipse, combined, plane_vectors
 from rigidsim.scene.kernels.ephemeris import Ephemeris
 from rigidsim.scene.validation_messages import nearest, shown
 
@@ -36,26 +34,13 @@ _CLOSEST = 1000
 """A scale of distance is at least this part of the initial one: it must not vanish for a plunging orbit."""
 
 
-class StartingOrbit(ConfigTable):
+class StartingOrbit(Ellipse):
     """Osculating elements at the start, about another of the bodies."""
 
     about: StrictStr = Field(examples=["sun"])
     """name of the point mass to which the elements are relative"""
     semi_major_axis: Positive[Metre] = Field(examples=["1 au"])
     """semi-major axis of the ellipse"""
-    eccentricity: Eccentricity = ZERO
-    """0 to below 1"""
-    inclination: Angle = ZERO
-    """inclination to the XY plane of the space axes"""
-    ascending_node: Angle = ZERO
-    """longitude of the ascending node from X"""
-    periapsis: Angle = ZERO
-    """argument of periapsis from the ascending node"""
-    mean_anomaly: Angle = ZERO
-    """mean anomaly at the start"""
-
-
-_BY_KERNEL = excludes("ephemeris", "position", "velocity", "orbit")
 
 
 class PointMassBody(ConfigTable):
@@ -110,23 +95,17 @@ class PointMasses:
             found = [context.zero] * 3
             for other, strength in enumerate(self.strengths):
                 if other != n:
-                    towards = [b - a for a, b in zip(self.positions[n], self.positions[other], strict=True)]
+                    towards = minus(self.positions[other], self.positions[n])
                     size = strength / norm(context, towards) ** 3
-                    found = [x + size * y for x, y in zip(found, towards, strict=True)]
+                    found = plus(found, [size * y for y in towards])
             return found
 
-        pairs = (
-            (self.positions[i], self.positions[j]),
-            (self.velocities[i], self.velocities[j]),
-            (pulled(i), pulled(j)),
-        )
-        place, velocity, acceleration = ([b - a for a, b in zip(*pair, strict=True)] for pair in pairs)
-        return place, velocity, acceleration
+        moving = minus(self.velocities[j], self.velocities[i])
+        return minus(self.positions[j], self.positions[i]), moving, minus(pulled(j), pulled(i))
 
     def encounter(self, context: Any, one: int, other: int) -> tuple[Any, Any]:
         """See ``closest``, for two of the masses."""
-        place = [a - b for a, b in zip(self.positions[one], self.positions[other], strict=True)]
-        moving = [a - b for a, b in zip(self.velocities[one], self.velocities[other], strict=True)]
+        place, moving = (minus(x[one], x[other]) for x in (self.positions, self.velocities))
         return closest(context, place, moving, self.strengths[one] + self.strengths[other])
 
 
@@ -156,6 +135,10 @@ def _fault(number: int, key: str, text: str) -> ConfigError:
     return ConfigError(Problem(f"[[bodies]] number {number + 1} {key}", text))
 
 
+def _of_body(key: str, text: str) -> ConfigError:
+    return ConfigError(Problem(f"[body] {key}", text))
+
+
 def resolve_point_masses(
     tables: Sequence[PointMassBody],
     host: str | None,
@@ -168,27 +151,22 @@ def resolve_point_masses(
 ) -> PointMasses | None:
     """Initial states of ``[[bodies]]``; None without any. ``mass`` (kg) is the rigid body's."""
     if not tables:
-        for key, given in (("host", host), ("coupling", coupling)):
-            if given is not None:
-                missing = (
-                    "are neither [[bodies]] nor an [ephemeris]" if key == "host" else "are no [[bodies]]"
-                )
-                what = f'given "{given}", but there {missing}; add them, or remove it'
-                raise ConfigError(Problem(f"[body] {key}", what))
+        what = f'given "{host}", but there are neither [[bodies]] nor an [ephemeris]; add them, or remove it'
+        ensure(host is None, _of_body("host", what))
+        what = f'given "{coupling}", but there are no [[bodies]]; add them, or remove it'
+        ensure(coupling is None, _of_body("coupling", what))
         return None
     names = [table.name for table in tables]
     at_host = _host(host, names, free_flight)
     full = coupling == "full"
     strengths = [_strength(number, table, context, ephemeris) for number, table in enumerate(tables)]
-    if full and mass is None:
-        what = 'missing; coupling = "full" needs it, since the bodies feel the forces of this one'
-        raise ConfigError(Problem("[body] mass", what))
+    what = 'missing; coupling = "full" needs it, since the bodies feel the forces of this one'
+    ensure(mass is not None or not full, _of_body("mass", what))
     if full and at_host is not None:
         expected = strengths[at_host] / context.mpf(GRAVITATIONAL_CONSTANT)
-        if abs(mass - expected) > _SAME_MASS * expected:
-            what = f"given {context.nstr(mass, 6)} kg, but the gravitational parameter of its host "
-            what += f'"{names[at_host]}" makes it {context.nstr(expected, 6)} kg; correct one of them'
-            raise ConfigError(Problem("[body] mass", what))
+        what = f"given {context.nstr(mass, 6)} kg, but the gravitational parameter of its host "
+        what += f'"{names[at_host]}" makes it {context.nstr(expected, 6)} kg; correct one of them'
+        ensure(abs(mass - expected) <= _SAME_MASS * expected, _of_body("mass", what))
     placed = {table.name for table in tables if table.ephemeris}
     if "earth_moon_barycenter" in placed and placed & {"earth", "moon"}:
         what = 'given "earth_moon_barycenter", whose mass contains "earth" and "moon"; remove one of them'
@@ -200,14 +178,12 @@ def resolve_point_masses(
     }
     for number in range(len(tables)):
         _place(number, tables, names, strengths, context, places, ())
-    positions = [places[n][0] for n in range(len(tables))]
-    velocities = [places[n][1] for n in range(len(tables))]
+    positions, velocities = ([places[n][k] for n in range(len(tables))] for k in (0, 1))
     if all(table.position is None and table.velocity is None and not table.ephemeris for table in tables):
         positions, velocities = (_about_barycentre(x, strengths) for x in (positions, velocities))
-    for i in range(len(tables)):
-        for j in range(i):
-            if positions[i] == positions[j]:
-                raise _fault(i, "position", f'the same position as "{names[j]}"; start it elsewhere')
+    for i, position in enumerate(positions):
+        same = next((names[j] for j in range(i) if positions[j] == position), None)
+        ensure(same is None, _fault(i, "position", f'the same position as "{same}"; start it elsewhere'))
     return PointMasses(tuple(names), strengths, tuple(positions), tuple(velocities), at_host, full)
 
 
@@ -230,17 +206,14 @@ def _strength(number: int, table: PointMassBody, context: Any, ephemeris: Epheme
 
 
 def _host(host: str | None, names: Sequence[str], free_flight: bool) -> int | None:
+    what = "missing; name the one of [[bodies]] that this body is, or give it an [initial] position and "
+    ensure(host is not None or free_flight, _of_body("host", what + "velocity"))
     if host is None:
-        if not free_flight:
-            what = "missing; name the one of [[bodies]] that this body is, or give it an [initial] position "
-            raise ConfigError(Problem("[body] host", what + "and velocity"))
         return None
-    if host not in names:
-        what = f"given {shown(host)}{nearest(host, names)}; allowed: {', '.join(names)}"
-        raise ConfigError(Problem("[body] host", what))
-    if free_flight:
-        what = f'given "{host}" with [initial] position or velocity; remove one of them'
-        raise ConfigError(Problem("[body] host", what))
+    what = f"given {shown(host)}{nearest(host, names)}; allowed: {', '.join(names)}"
+    ensure(host in names, _of_body("host", what))
+    what = f'given "{host}" with [initial] position or velocity; remove one of them'
+    ensure(not free_flight, _of_body("host", what))
     return names.index(host)
 
 
@@ -256,27 +229,23 @@ def _place(
     """Position and velocity of one mass, and of those about which it orbits."""
     if number in places:
         return places[number]
-    table, zero = tables[number], [context.zero] * 3
+    table = tables[number]
     if table.orbit is None:
-        alone = table.position is None and table.velocity is None
-        if alone and any(t is not table and t.orbit is t.position is t.velocity is None for t in tables):
-            raise _fault(number, "position", "missing; only one body may be left where all others start from")
-        place = [x.at(context) for x in table.position] if table.position else list(zero)
-        moving = [x.at(context) for x in table.velocity] if table.velocity else list(zero)
-    else:
-        about = table.orbit.about
-        others = [name for name in names if name != table.name]
-        if about not in others:
-            what = f"given {shown(about)}{nearest(about, others)}; allowed: {', '.join(others) or 'none'}"
-            raise _fault(number, "orbit.about", what)
-        centre = names.index(about)
-        if centre in asking:
-            raise _fault(number, "orbit.about", f'given "{about}", which goes about this body itself')
-        r, v = _place(centre, tables, names, strengths, context, places, (*asking, number))
-        x, u = _of_elements(table.orbit, strengths[centre] + strengths[number], context)
-        place = [a + b for a, b in zip(r, x, strict=True)]
-        moving = [a + b for a, b in zip(v, u, strict=True)]
-    places[number] = place, moving
+        nowhere = [n for n, x in enumerate(tables) if x.orbit is x.position is x.velocity is None]
+        what = "missing; only one body may be left where all others start from"
+        ensure(number not in nowhere or len(nowhere) == 1, _fault(number, "position", what))
+        places[number] = vector(context, table.position), vector(context, table.velocity)
+        return places[number]
+    about = table.orbit.about
+    others = [name for name in names if name != table.name]
+    what = f"given {shown(about)}{nearest(about, others)}; allowed: {', '.join(others) or 'none'}"
+    ensure(about in others, _fault(number, "orbit.about", what))
+    centre = names.index(about)
+    what = f'given "{about}", which goes about this body itself'
+    ensure(centre not in asking, _fault(number, "orbit.about", what))
+    around = _place(centre, tables, names, strengths, context, places, (*asking, number))
+    own = _of_elements(table.orbit, strengths[centre] + strengths[number], context)
+    places[number] = plus(around[0], own[0]), plus(around[1], own[1])
     return places[number]
 
 
@@ -294,4 +263,4 @@ def _of_elements(orbit: StartingOrbit, strength: Any, context: Any) -> tuple[Vec
 def _about_barycentre(vectors: Sequence[Vector], strengths: Vector) -> list[Vector]:
     whole = sum(strengths)
     mean = [sum(s * v[i] for s, v in zip(strengths, vectors, strict=True)) / whole for i in range(3)]
-    return [[x - y for x, y in zip(v, mean, strict=True)] for v in vectors]
+    return [minus(v, mean) for v in vectors]

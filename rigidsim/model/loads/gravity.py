@@ -32,8 +32,14 @@ from rigidsim.scene.fields import (
     one_of,
 )
 from rigidsim.scene.kernels.series import exactly
-from rigidsim.scene.orbit_keys import SIDES, Orbit, OrbitFields
-from rigidsim.scene.orbits import attracting_body, resolve_orbit, resolve_tabulated_orbit
+from rigidsim.scene.orbits import (
+    SIDES,
+    Orbit,
+    OrbitFields,
+    attracting_body,
+    resolve_orbit,
+    resolve_tabulated_orbit,
+)
 from rigidsim.scene.registry import SceneLoad, Setting, SourceFields, register_load
 from rigidsim.scene.space_axes import ECLIPTIC
 

@@ -50,8 +50,7 @@ from rigidsim.scene.fields import (
     together,
 )
 from rigidsim.scene.geomagnetic_field import MOST, RADIUS, igrf
-from rigidsim.scene.orbit_keys import OrbitFields
-from rigidsim.scene.orbits import resolve_orbit
+from rigidsim.scene.orbits import OrbitFields, resolve_orbit
 from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
