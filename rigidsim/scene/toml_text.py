@@ -194,7 +194,7 @@ def toml_text(tables: Mapping[str, Any]) -> str:
         elif isinstance(plain, list) and plain and all(isinstance(entry, Mapping) for entry in plain):
             document[_key(key)] = tomlkit.aot()
             for number, entry in enumerate(plain):
-                document[key].append(_table(entry, f"{key}[{number}]"))  # type: ignore[union-attr]
+                document[key].append(_table(entry, f"{key}[{number}]"))
         elif value is not None:
             document[_key(key)] = tomlkit.value(inline(value, str(key)))
     return document.as_string()
