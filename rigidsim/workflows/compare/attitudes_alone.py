@@ -16,11 +16,12 @@ import numpy as np
 
 from rigidsim.scene.row_rotations import conjugated, multiplied, normalised, turned, vector_of
 from rigidsim.solve.from_states import RowStates
+from rigidsim.workflows.fit.estimation import Linear, iterate
 
 _STEP = 0.15  # rad of turning in a step of the classical Runge-Kutta method, which gives derivatives alone
 _SMALL = 1e-5  # relative step of derivatives
 _ITERATIONS = 4
-_REFINEMENTS = 6
+_EVALUATIONS = 8
 _SYMMETRIC = np.array(
     [[[float({i, j} == {a, b}) for j in range(3)] for i in range(3)] for a in range(3) for b in range(a, 3)]
 )
@@ -31,9 +32,8 @@ the directions of the space axes.
 """
 _NOTHING = 1e-8  # of the effect of the largest change, by differences in double precision
 _SPARE = 1.5  # times as many numbers as are fitted have to be there
-_PROGRESS = 4.0  # of the sum of squares, below which a further iteration is none
-_EXPLAINED = 1e-4  # share of the defects that is nothing
-_RANKS = (1e-4, 1e-3, 1e-2)  # of singular values, of which derivatives by differences leave 1e-5
+_WITHIN = 0.1  # of the defects' size: a step as short as this is the last
+_ROUNDING = 1e-5  # relative, of derivatives by differences
 
 
 class WindowsOfAttitudes:
@@ -67,11 +67,10 @@ class WindowsOfAttitudes:
         self.defects = _apart_from(by_rates, self._missed(nothing)[..., None])[..., 0]
         self.size = float(np.sqrt(np.mean(self.defects**2)))
 
-    def explain(self, noise: float, forms: int) -> None:
+    def explain(self, forms: int) -> None:
         """Find the change of the equations that explains the defects best, if the rows suffice for it.
 
         Args:
-            noise: of the defects by the digits, rad.
             forms: ``MOMENTS`` and loads alone, also ``STEADY`` accelerations, or ``WIDER`` ones.
         """
         available = min(self.defects.size, 3 * len(np.unique(self.rows)))
@@ -79,36 +78,40 @@ class WindowsOfAttitudes:
         self.unexplained = float("nan")
         if _SPARE * len(change) > available:
             return
-        start, left, rank = self.rates, self.defects, 0
-        for _ in range(_REFINEMENTS):
-            by_rates, by_change = self._derivatives(change)
-            missed = self._missed(change)
-            both = _apart_from(by_rates, np.concatenate([by_change, missed[..., None]], axis=2))
-            table, goal = both[..., :-1].reshape(-1, len(change)), both[..., -1].ravel()
-            scale = np.linalg.norm(table, axis=0)
-            scale[scale <= _NOTHING * scale.max()] = np.inf  # changes that change nothing
-            rates, before, gain = self.rates, change, 0.0
-            for limit in _RANKS:
-                step, _, rank, _ = np.linalg.lstsq(table / scale, goal, rcond=limit)
-                change = before + step / scale
-                self.rates = rates + _solved(by_rates, missed - by_change @ (step / scale))
-                with np.errstate(all="ignore"):  # of steps that lead too far
-                    now = _apart_from(by_rates, self._missed(change)[..., None])[..., 0]
-                    gain = float(np.sum(left**2) / np.sum(now**2))
-                if gain > 1:
-                    break
-            if not gain > 1:
-                self.rates, change = rates, before
-                break
-            left = now
-            if gain < _PROGRESS or np.sqrt(np.mean(left**2)) < max(noise, _EXPLAINED * self.size):
-                break
-        free = left.size * max(1 - rank / available, 1 / available)
-        self.unexplained = float(np.sqrt(np.sum(left**2) / free))
+        start = self.rates
+        ended = iterate(change, self._linear, most=_EVALUATIONS, within=_WITHIN)
+        if ended is None:
+            return
+        rank = len(change) - len(ended.solution.null)
+        free = ended.linear.residuals.size * max(1 - rank / available, 1 / available)
+        left = max(ended.linear.cost - ended.solution.step_sigmas**2, 0.0)  # after a last step
+        self.unexplained, change = float(self.size * np.sqrt(left / free)), ended.values
         states = self.equations.states(self._own, self._seen[:, 0], self.rates)
         more = self._added(states, self._at[:, 0], change[None])
         self.acceleration = float(np.sqrt(np.mean(np.sum(more**2, axis=1))))
         self.rates = start
+
+    def _linear(self, change: np.ndarray) -> Linear | None:
+        """The defects with a change (numbers,) of the equations, over their size without it, linearised; with
+        rates that come nearest to the rows.
+        """
+        before = self.rates
+        with np.errstate(all="ignore"):  # of steps that lead too far
+            by_rates, by_change = self._derivatives(change)
+            if not np.isfinite(by_rates).all() or not np.isfinite(by_change).all():
+                return None
+            if change.any():
+                self.rates = self.rates + _solved(by_rates, self._missed(change))
+            both = np.concatenate([by_change, self._missed(change)[..., None]], axis=2)
+        table = _apart_from(by_rates, both).reshape(-1, len(change) + 1) / self.size
+        sizes = np.linalg.norm(table[:, :-1], axis=0)
+        noise = np.where(sizes <= _NOTHING * sizes.max(), np.inf, _ROUNDING * sizes)
+        none = np.zeros(len(change))
+        linear = Linear(table[:, -1], table[:, :-1], np.zeros((len(table), 0)), noise, none, none, [])
+        if np.isfinite(linear.cost):
+            return linear
+        self.rates = before
+        return None
 
     def _added(self, states: np.ndarray, times: np.ndarray, changes: np.ndarray) -> np.ndarray:
         """Accelerations (rows, 3), rad/s^2, body axes, that changes (lanes, numbers) of the equations add."""
@@ -126,7 +129,7 @@ class WindowsOfAttitudes:
             shapes += [np.ones((len(rates), 1)), rates / self.rate]
         if forms >= WIDER:
             unit = conjugated(normalised(quaternions))
-            shapes += [turned(unit, np.broadcast_to(axis, rates.shape)) for axis in np.eye(3)]
+            shapes.append(turned(unit[:, None], np.eye(3)).reshape(len(rates), 9))
             shapes += [rates[:, i : i + 1] * rates[:, i:] / self.rate**2 for i in range(3)]
         steady = np.concatenate(shapes, axis=1).reshape(lanes, w.shape[1], -1)
         factors = changes[:, _MOMENTS:].reshape(lanes, forms, 3) * self.rate**2

@@ -244,7 +244,7 @@ class Evidence:
             length = min(_LONGER * length, span)
             found = self._alone(length) or found
         if found is not None and found.size > _ABOVE * self.attitude_noise:
-            found.explain(self.attitude_noise, STEADY if span >= _LONG else MOMENTS)
+            found.explain(STEADY if span >= _LONG else MOMENTS)
             self.explained = found
         return found
 
@@ -397,7 +397,7 @@ def _by_attitudes(seen: Evidence, windows: WindowsOfAttitudes | None) -> Verdict
     if share <= _ALONE or (left <= 2 * noise and share <= _IN_NOISE):
         more = f"by {windows.acceleration:.3g} rad/s^2"
         return WRONG_MODEL, f"its equations are others, {more}: {told} {left:.2g} rad"
-    windows.explain(noise, WIDER)
+    windows.explain(WIDER)
     if windows.unexplained / windows.size > _ALONE:
         loose = "its equations are these, loosely integrated"
         return INTEGRATION_ERROR, f"{loose}: {told} {windows.unexplained:.2g} rad"

@@ -149,8 +149,9 @@ def iterate(
     linearised: Callable[[np.ndarray], Linear | None],
     told: Callable[[str], None] = lambda _: None,
     most: int = MOST_EVALUATIONS,
+    within: float = WITHIN,
 ) -> Ended | None:
-    """Damped Gauss-Newton steps until they are shorter than ``WITHIN`` sigmas, or change the sum of squares
+    """Damped Gauss-Newton steps until they are shorter than ``within`` sigmas, or change the sum of squares
     by rounding alone.
 
     Args:
@@ -168,8 +169,8 @@ def iterate(
     while True:
         length, cost = solution.step_sigmas, linear.cost
         told(f"evaluation {evaluations}: sum of squares {cost:.6g}, next step {length:.2g} sigmas")
-        if length <= WITHIN or evaluations >= most or damping > _DAMPING[1]:
-            return Ended(values, linear, solution, length <= WITHIN, evaluations)
+        if length <= within or evaluations >= most or damping > _DAMPING[1]:
+            return Ended(values, linear, solution, length <= within, evaluations)
         step = solution.step(damping)
         trial, evaluations = linearised(values + step), evaluations + 1
         if trial is not None and trial.cost < cost:

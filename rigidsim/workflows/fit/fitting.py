@@ -5,18 +5,15 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import json
-import platform
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import heyoka
 import numpy as np
 import xarray
 
-from rigidsim import __version__
 from rigidsim.errors import (
     FORCE,
     OUT,
@@ -29,7 +26,7 @@ from rigidsim.errors import (
     RunFolderError,
 )
 from rigidsim.scene.config import Experiment
-from rigidsim.store import atomic
+from rigidsim.store import atomic, provenance
 from rigidsim.store.fits import BEGUN
 from rigidsim.store.folder import FileOf, WorkFolder
 from rigidsim.store.outputs import refuse_inputs
@@ -319,8 +316,5 @@ def identity(experiment: Experiment, sources: Sequence[DataFiles]) -> dict[str, 
         "text_sha256": hashlib.sha256(experiment.text.encode()).hexdigest(),
         "data_sha256": [digest(files[0]) for files in sources],
         **({"kernels_sha256": kernels} if any(kernels) else {}),
-        "versions": {
-            "rigidsim": __version__, "heyoka": heyoka.__version__, "numpy": np.__version__,
-            "python": platform.python_version(),
-        },
-    }  # fmt: skip
+        "versions": provenance.versions(),
+    }
