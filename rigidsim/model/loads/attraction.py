@@ -475,10 +475,12 @@ class SourceFigure(ByPlacedSource):
     Attributes:
         size: its J2 R'^2, m^2 (mpf).
         pole: unit vector (mpf, space axes) that rests; None for the Earth's.
+        context: the scene's arithmetic.
         epoch, axes: date of time 0 and the space axes, for the Earth's.
     """
 
     size: Any
+    context: Any
     pole: Vector | None
     epoch: Epoch | None = None
     axes: str | None = None
@@ -499,7 +501,7 @@ class SourceFigure(ByPlacedSource):
     @property
     def corotating_orbit(self) -> KeplerOrbit | None:  # type: ignore[override]
         """The orbit of the source, if its pole is along the orbit's normal."""
-        orbit, context = super().corotating_orbit, self.size.context
+        orbit, context = super().corotating_orbit, self.context
         if orbit is None or self.pole is None or not parallel(context, orbit.normal(context), self.pole):
             return None
         return orbit
@@ -597,10 +599,10 @@ class SourceFigure(ByPlacedSource):
         size = given.J2.at(context) * radius**2
         if isinstance(given.pole, str):
             _refuse_pole(fields.source, around)
-            return load.part(cls, size=size, pole=None, epoch=around.epoch, axes=around.axes)
+            return load.part(cls, size=size, context=context, pole=None, epoch=around.epoch, axes=around.axes)
         pole = [x.at(context) for x in given.pole]
         far = norm(context, pole)
-        return load.part(cls, size=size, pole=[x / far for x in pole])
+        return load.part(cls, size=size, context=context, pole=[x / far for x in pole])
 
 
 def refuse_inside(load: Attraction, radius: Any, key: str, around: Setting) -> None:

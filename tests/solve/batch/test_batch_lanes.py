@@ -171,11 +171,13 @@ def test_events_and_guards_end_members() -> None:
             assert (block.steps <= 3).all() or status is Status.MAX_DRIFT
 
 
-@pytest.mark.parametrize("key", ["loads[0].gravitational_parameter", "loads[0].orbit.eccentricity"])
+@pytest.mark.parametrize("key", ["gravitational_parameter", "orbit.eccentricity", "figure.J2"])
 def test_members_whose_loads_are_swept_go_together(key: str) -> None:
     """Though loads are tried at states of numbers, to see what they conserve."""
     load = 'kind = "gravity_gradient"\ngravitational_parameter = 1\n'
     load += "orbit = {semi_major_axis = 1, eccentricity = 0.1}"
+    if "figure" in key:
+        load += "\nfigure = {J2 = 0.1, radius = 0.1, pole = [0, 0, 1]}"
     rates = "angular_velocity = [0.1, 0.2, 1]"
     text = config(
         "principal_moments = [1, 2, 2.5]",
@@ -184,6 +186,6 @@ def test_members_whose_loads_are_swept_go_together(key: str) -> None:
         "end = 5\nsamples = 3",
         output='record = ["quaternion"]',
     )
-    found = Families(Members(swept(text, {key: "values = [0.1, 0.14, 0.17]"}))).sort()
+    found = Families(Members(swept(text, {f"loads[0].{key}": "values = [0.1, 0.14, 0.17]"}))).sort()
     assert len(found.groups) == 1
     assert not found.alone
