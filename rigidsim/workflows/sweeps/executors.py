@@ -4,13 +4,14 @@ No bit depends on which is used. A worker process that dies ends the session, an
 stay. Dask computes the tiles of a worker that died with others.
 """
 
+import itertools
 import multiprocessing
 import os
 import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -102,7 +103,11 @@ class Workers:
             done, _ = wait(running, timeout=_LOOK_SECONDS, return_when=FIRST_COMPLETED)
             self.count()
             for future in done:
-                yield running.pop(future), future.result()
+                ended = running.pop(future)
+                if future.cancelled():  # Dask lost it with the worker that had it
+                    tasks, task = itertools.chain([ended], tasks), ()
+                else:
+                    yield ended, future.result()
 
 
 @contextmanager
@@ -184,7 +189,12 @@ def cluster(address: str, patience: float = 20.0, alone: float = 120.0) -> Itera
 
     def threads() -> int:
         nonlocal seen
-        found = int(sum(client.nthreads().values()))
+        try:
+            found = int(sum(client.nthreads().values()))
+        except (OSError, RuntimeError) as error:  # what Dask raises if a connection is gone
+            raise StoppedError(
+                f"--scheduler {address}: the scheduler is gone; start it again, with its workers, {kept}"
+            ) from error
         seen = time.monotonic() if found else seen
         if time.monotonic() - seen > alone:
             raise StoppedError(
@@ -201,9 +211,3 @@ def cluster(address: str, patience: float = 20.0, alone: float = 120.0) -> Itera
                 f"--scheduler {address}: workers died again and again at the same members; give them more "
                 f"memory, or take a smaller [sweep] tile, {kept}"
             ) from None
-        except (OSError, RuntimeError, CancelledError) as error:  # what Dask raises if a connection is gone
-            if client.status == "running" and not isinstance(error, CancelledError):
-                raise
-            raise StoppedError(
-                f"--scheduler {address}: the scheduler is gone; start it again, with its workers, {kept}"
-            ) from error
