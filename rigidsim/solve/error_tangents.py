@@ -499,23 +499,20 @@ class Measures:
         return found
 
     def _angles_between(self, states: np.ndarray, apart: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-        """Angles (motions, others), rad, between the attitudes."""
+        """Angles (motions, others), rad, between the attitudes, all at one time: a frame that turns with time
+        doesn't change their distances.
+        """
         if self._chord is not None:
             return np.asarray(self._chord * np.sqrt((apart[self.places["attitude"]] ** 2).sum(axis=0)))
+        assert self._attitude is not None
         _, motions, others = apart.shape
         every = np.concatenate([states[:, :, None], states[:, :, None] + apart], axis=2)
         read = np.repeat(parameters, others + 1, axis=1)
-        found = self._quaternions(every.reshape(len(states), -1), read).reshape(4, motions, -1)
+        rows = np.concatenate([every.reshape(len(states), -1), read]).T
+        quaternion, variables = self._attitude.quaternion, self._variables
+        function = compiled_function(quaternion, variables, compact_mode=True, fp_type=float)
+        found = evaluate_rows(function, rows, times=np.zeros(len(rows))).reshape(4, motions, -1)
         return np.asarray(2.0 * np.sqrt(((found[:, :, 1:] - found[:, :, :1]) ** 2).sum(axis=0)))
-
-    def _quaternions(self, states: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-        """Attitudes (4, n), all at one time: a frame that turns with time doesn't change their distances."""
-        assert self._attitude is not None
-        function = compiled_function(
-            self._attitude.quaternion, self._variables, compact_mode=True, fp_type=float
-        )
-        rows = np.concatenate([states, parameters]).T
-        return evaluate_rows(function, rows, times=np.zeros(states.shape[1]))
 
 
 class Spread:
