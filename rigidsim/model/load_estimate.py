@@ -82,28 +82,28 @@ def estimate_drive(
     return trial.drive()
 
 
-def effect_at_start(plan: ModelPlan, loads: Sequence[Load]) -> list[tuple[str, float, str]]:
-    """Torque and force of loads together at the start: what it is, its size and its unit."""
-    trial = _Trial(plan.scene, plan.requirements, plan.surfaces, plan.loads, loads)
-    unit, mass, context = trial.m.scaling, plan.scene.body.mass, plan.scene.context
-    begin = np.array([float(context.ldexp(plan.scene.start, -unit.time))])
-    values = trial.whole(begin, trial.start[:, None])
-    given = [("torque", trial.torques, values[:3], 2.0**unit.energy, "N m")]
-    if trial.m.velocity is not None:
-        given.append(
-            (
-                "force",
-                trial.forces,
-                values[6:9],
-                float(trial.m.carried(mass)) * 2.0 ** (unit.speed - unit.time),
-                "N",
-            )
-        )
-    return [
-        (what, float(np.linalg.norm(x)) * size, symbol)
-        for what, terms, x, size, symbol in given
-        if any(terms)
+def effects_at_start(plan: ModelPlan, groups: Sequence[Sequence[Load]]) -> list[list[tuple[str, float, str]]]:
+    """Torque and force at the start of each group of loads together: what it is, its size and its unit."""
+    if not any(groups):
+        return [[] for _ in groups]
+    scene, m = plan.scene, probe(plan.scene, plan.requirements, plan.loads)
+    (names, start), unit = start_of(m, plan.loads), m.scaling
+    kinds = [("torque", torque_terms, 2.0**unit.energy, "N m")]
+    if m.velocity is not None:
+        mass = float(m.carried(scene.body.mass))
+        kinds.append(("force", force_terms, mass * 2.0 ** (unit.speed - unit.time), "N"))
+    terms = [
+        [term for load in group for term in terms_of(load, m)]
+        for group in groups
+        for _, terms_of, *_ in kinds
     ]
+    function = hy.cfunc(
+        [x for each in terms for x in _sums(each)], list(hy.make_vars(*names)), compact_mode=True
+    )
+    values = function(start, time=float(scene.context.ldexp(scene.start, -unit.time)))
+    sizes = iter(zip(terms, np.linalg.norm(np.reshape(values, (-1, 3)), axis=1), strict=True))
+    rows = [[(what, *next(sizes), size, symbol) for what, _, size, symbol in kinds] for _ in groups]
+    return [[(what, float(x) * size, symbol) for what, acts, x, size, symbol in row if acts] for row in rows]
 
 
 def probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> Mechanics:
@@ -163,9 +163,6 @@ class _Trial:
 
     Attributes:
         names, start: of all states that the loads may read.
-        torques, forces: terms of each load.
-        whole: total torque, torque exerted by carriers, force, and of each what of its rate of change is
-            explicit in time, (18, n).
     """
 
     def __init__(
@@ -174,22 +171,20 @@ class _Trial:
         requirements: Requirements,
         surfaces: Surfaces,
         loads: Sequence[Load],
-        tried: Sequence[Load] = (),
     ) -> None:
         m = self.m = probe(scene, requirements, loads)
-        self._tried = tried or loads
+        self._loads = loads
         carriers = [x for x in loads_of(scene) if isinstance(x, Carrier)]  # whose states any load may read
         self.names, self.start = start_of(m, [*loads, *(x for x in carriers if x not in loads)])
-        self._carriers: list[Any] = [load for load in self._tried if isinstance(load, Carrier)]
-        self.torques = [torque_terms(load, m) for load in self._tried]
-        flies = m.velocity is not None
-        self.forces = [force_terms(load, m) if flies else [] for load in self._tried]
-        exerted = [load.exerted_torque(m) if isinstance(load, Carrier) else [] for load in self._tried]
-        kinds, self._exerts = (self.torques, exerted, self.forces), any(exerted)
+        self._carriers: list[Any] = [load for load in self._loads if isinstance(load, Carrier)]
+        torques = [torque_terms(load, m) for load in loads]
+        forces = [force_terms(load, m) if m.velocity is not None else [] for load in loads]
+        exerted = [load.exerted_torque(m) if isinstance(load, Carrier) else [] for load in loads]
+        kinds, self._exerts = (torques, exerted, forces), any(exerted)
         sums = [x for terms in kinds for x in _sums(chain(*terms))]
         self._parts = [x for terms in zip(*kinds, strict=True) for x in _sums(chain(*terms))]
         in_time = (s.expression for s in surfaces.found if names_used(s.expression) == {"t"})
-        narrow = [u for load in self._tried for u in load.narrow(m)] + written(m, in_time)
+        narrow = [u for load in self._loads for u in load.narrow(m)] + written(m, in_time)
         zeros = [y for u in narrow for y in (u, _by_time(u))]
         self._all = self._compiled([*sums, *map(_by_time, sums), *zeros, *self._parts])
         self._narrow = range(18, 18 + len(zeros), 2)
@@ -197,6 +192,9 @@ class _Trial:
         self._begin, self._span = begin, end - begin
 
     def whole(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
+        """Total torque, torque exerted by carriers, force, and of each the part of its rate of change that is
+        explicit in time, (18, n).
+        """
         return self._all(times, states)[:18]
 
     def _compiled(self, expressions: Sequence[Symbolic]) -> Function:
@@ -225,7 +223,7 @@ class _Trial:
         times = self._begin + self._span * generator.uniform(0, 1, _OPPOSITE)
         here, there = (self._all(times, x)[-len(self._parts) :] for x in (states, other))
         for load, one, opposite in zip(
-            self._tried, here.reshape(-1, 3, _OPPOSITE), there.reshape(-1, 3, _OPPOSITE), strict=True
+            self._loads, here.reshape(-1, 3, _OPPOSITE), there.reshape(-1, 3, _OPPOSITE), strict=True
         ):
             different = np.abs(one - opposite) > _ROUNDING * np.abs([one, opposite]).max(axis=(0, 1))
             if different.any():

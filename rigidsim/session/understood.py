@@ -5,7 +5,7 @@ from typing import Any
 
 from rigidsim.model.formulations.formulation import ModelPlan
 from rigidsim.model.load import Load, loads_of
-from rigidsim.model.load_estimate import effect_at_start
+from rigidsim.model.load_estimate import effects_at_start
 from rigidsim.model.load_words import length_text
 from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.placements.flight import FlownByKernel
@@ -95,14 +95,16 @@ def told_loads(prepared: InitialValueProblem, *, sizes: bool = True) -> tuple[st
         ]
     placed = {source.number for source in sources_of(scene.config)}
     rows += [(load.title, load.__doc__ or "given from Python", load) for load in prepared.python_loads]
+    effects = effects_at_start(plan, [_together(plan, load) if sizes else [] for _, _, load in rows])
     said = []
     for number, (what, given, load) in enumerate(rows):
         name = getattr(given, "name", None)
         said.append(f"{what} {name}: {_value(given)}" if name else f"{what}: {_value(given)}")
         said[-1] += f"; {load.remark}" if load.remark else ""
         place = load.source_at_start(scene) if sizes and number in placed else []
-        if effects := [*_seen(place, scene), *(_effects(plan, load) if sizes else [])]:
-            said[-1] += f"; at the start {', '.join(effects)}"
+        acting = [f"{kind} {number_text(size, _DIGITS)} {unit}" for kind, size, unit in effects[number]]
+        if at_start := [*_seen(place, scene), *acting]:
+            said[-1] += f"; at the start {', '.join(at_start)}"
     return (*said, *(state.told for state in scene.states))
 
 
@@ -114,15 +116,12 @@ def _seen(place: Vector, scene: Scene) -> Iterator[str]:
         yield f"source {length_text(float(plain(away)))} away towards [{towards}] in space axes"
 
 
-def _effects(plan: ModelPlan, load: Load) -> list[str]:
-    """Sizes of a load's torque and force, with what acts beside it; none of long series."""
+def _together(plan: ModelPlan, load: Load) -> list[Load]:
+    """A load with what acts beside it, whose torque and force are shown; none of long series."""
     together = [x for x in plan.loads if load is x or load is x.beside]
     if load.uniform_field is not None:  # all of which are one load
         together = [x for x in plan.loads if isinstance(x, UniformGravity)]
-    if not together or any(x.wide for x in together):
-        return []
-    found = effect_at_start(plan, together)
-    return [f"{what} {number_text(size, _DIGITS)} {unit}" for what, size, unit in found]
+    return [] if any(x.wide for x in together) else together
 
 
 def _value(value: Any) -> str:
