@@ -1,8 +1,8 @@
 """CCSDS messages of other programs, in KVN or XML: attitudes from body to space axes and rates along body
 axes (AEM of 504.0-B-1 and 504.0-B-2), the path in SI (OEM of 502.0-B). Covariances are passed over.
 
-Conventions of annex F of 504.0-B-2. The quaternion from frame A to frame B turns the axes of A into those of
-B, so that it turns a vector's coordinates in B into those in A; Euler angles from A to B are intrinsic turns;
+Conventions of annex F of 504.0-B-2. The quaternion from frame A to frame B turns the axes of A into B's, so
+that it turns a vector's coordinates in B into coordinates in A; Euler angles from A to B are intrinsic turns;
 the angular velocity from A to B is how B turns as seen from A. Spin angles place the Z axis of the body: the
 attitude is turns by alpha + 90 deg, 90 deg - delta and the spin angle about Z, X, Z.
 

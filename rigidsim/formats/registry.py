@@ -1,4 +1,4 @@
-"""Formats: their description, their lookup by name, and what they are told of a run besides its numbers."""
+"""Formats: their description, their lookup by name, and what they know of a run beyond its numbers."""
 
 import importlib.util
 from collections.abc import Callable, Mapping

@@ -47,7 +47,7 @@ _WANTED, _ALLOWED = 2e-13, 1e-12
 """Errors of the attitude (rad) that are aimed at, and beyond which nothing is written; the latter, relative
 to the largest, is the bound of the angular velocity, too.
 """
-_LONGEST_NAME = 26  # characters, with "FRAME_" those of a variable of SPICE's
+_LONGEST_NAME = 26  # characters; a variable of SPICE has six more, for "FRAME_"
 _LINE = 78
 _PUBLIC, _MANY = 1_400_000, 600_000  # numbers of frames that NAIF leaves to its users
 _CHECKED = 64  # recorded samples that the run is compared at when it is integrated again

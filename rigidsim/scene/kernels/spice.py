@@ -150,10 +150,10 @@ def resolve_orientation(
         what = 'missing; [output] orientation needs the date of time 0, such as "J2000"'
         raise ConfigError(Problem("[time] epoch", what))
     if axes not in (ECLIPTIC, *CELESTIAL):
-        told = "missing; [output] orientation needs to know" if axes is None else f'given "{axes}", which'
+        said = "missing; [output] orientation needs to know" if axes is None else f'given "{axes}", which'
         more = " what the space axes are" if axes is None else " differs from SPICE's axes by 0.02 arcsec"
         allowed = ", ".join(f'"{name}"' for name in (*CELESTIAL, ECLIPTIC))
-        raise ConfigError(Problem("[frame] axes", f"{told}{more}; allowed: {allowed}"))
+        raise ConfigError(Problem("[frame] axes", f"{said}{more}; allowed: {allowed}"))
     ahead = epoch.since_j2000()
     begin, end = sorted(float(ahead + Fraction(float(time))) for time in run)
     try:

@@ -38,9 +38,9 @@ _LARGEST_TILT = 0.9999  # of sin(i/2): 178.4 deg
 
 
 class TabulatedOrbit:
-    """An orbit with elements over time; numbers are mpf of the scene's precision, SI. ``motion`` is of the
-    semi-major axis, the mean motion. The elements are the table's, or with ``opposite`` those of the other
-    body: half a turn on in its plane.
+    """An orbit with elements over time; numbers are mpf of the scene's precision, SI. ``motion`` gives the
+    mean motion for a semi-major axis. The elements are the table's; with ``opposite`` they are the other
+    body's: half a turn on in its plane.
     """
 
     def __init__(
