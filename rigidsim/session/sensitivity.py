@@ -108,21 +108,14 @@ class Sensitivity:
         if rows is not None:
             found["attitude_sensitivity"] = turned(rows.values["quaternion"], rows.slopes["quaternion"])
             found["angular_velocity_sensitivity"] = rows.slopes["angular_velocity"]
-            if self._flies:
-                found["position_sensitivity"] = rows.slopes["position"]
+            found["position_sensitivity"] = rows.slopes.get("position", np.zeros(0))
         columns: Columns = {}
-        for name in NAMES:
-            if name == "position_sensitivity" and not self._flies:
-                continue
-            size = 3 * self._engine.keys
-            known = self._precision.parts(found[name].reshape(-1)) if name in found else []
-            parts = [part.reshape(-1, size) for part in known]
-            filled = [np.full((count, size), np.nan) for _ in range(self._precision.part_count)]
-            for n, whole in enumerate(filled):
-                whole[:, :] = np.nan if n == 0 else 0.0
-                if parts:
-                    whole[: len(parts[n])] = parts[n]
-            columns[name] = filled
+        for name in [name for name in NAMES if self._flies or name != "position_sensitivity"]:
+            shape, more = (count, 3 * self._engine.keys), self._precision.part_count - 1
+            columns[name] = [np.full(shape, np.nan), *(np.zeros(shape) for _ in range(more))]
+            parts = self._precision.parts(found[name].reshape(-1)) if found else []
+            for whole, part in zip(columns[name], parts, strict=False):
+                whole.reshape(-1)[: len(part)] = part
         return columns
 
     def pack(self) -> Arrays:

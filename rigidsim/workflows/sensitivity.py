@@ -125,7 +125,7 @@ class Tangents:
             raise ConfigError(Problem(_WHERE, what), self._source)
         clock = np.asarray(times, dtype=np.float64)
         try:
-            return self._told(clock, self.rows(values, clock))
+            return self._sensitivities(clock, self.rows(values, clock))
         except LostTangents as error:
             raise ConfigError(Problem(_WHERE, f"the motion can't be differentiated: {error}")) from None
 
@@ -172,7 +172,7 @@ class Tangents:
             raise ConfigError(Problem("times", what + f"{side} times are allowed"), self._source)
         return self._precision.of_doubles(way * np.ldexp(times, -scaling.time))
 
-    def _told(self, times: np.ndarray, rows: Rows) -> Sensitivities:
+    def _sensitivities(self, times: np.ndarray, rows: Rows) -> Sensitivities:
         quaternion, by = rows.values["quaternion"], rows.slopes
         norm = np.sqrt((quaternion.astype(np.float64) ** 2).sum(axis=1))[:, None]
         values = {name: x.astype(np.float64) for name, x in rows.values.items()}
