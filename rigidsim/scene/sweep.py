@@ -127,7 +127,7 @@ class Sweep:
 
         Raises:
             ConfigError: there is no sweep, or one without members; every problem found. Whether members can
-                be run is told by ``experiment(member)``.
+                be run is known by ``experiment_of(member)``.
         """
         table, config = experiment.config.sweep, experiment.config
         if table is None:
