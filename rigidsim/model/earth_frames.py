@@ -19,7 +19,7 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.scene.epochs import Epoch, leap_seconds, tdb_minus_tt
-from rigidsim.scene.flight_starts import PROPAGATORS, ROTATIONS, Rotation
+from rigidsim.scene.starts import PROPAGATORS, ROTATIONS, Rotation
 from rigidsim.scene.two_line_elements import TwoLineElements
 
 LONGEST = 30

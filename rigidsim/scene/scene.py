@@ -13,10 +13,8 @@ from rigidsim.scene.bodies.body import RigidBody, build_body, inverse_inertia
 from rigidsim.scene.bodies.gravity_field import asked_degree, gravity_field_of
 from rigidsim.scene.bodies.outside import surfaces_of, with_surfaces
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.events import Event, resolve_events
 from rigidsim.scene.expressions.names import names_of
 from rigidsim.scene.expressions.tree import Expression, names_used
-from rigidsim.scene.flight_starts import flight_start
 from rigidsim.scene.frame import figure_of, reference_normal
 from rigidsim.scene.kernels.ephemeris import host_of, resolve_ephemeris
 from rigidsim.scene.moving_moments import moments_at_start
@@ -30,6 +28,16 @@ if TYPE_CHECKING:
     from rigidsim.scene.kernels.spice import Orientation
 
 T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Event:
+    """One event of a scene: its direction is any, up or down; with ``stop`` the run ends there."""
+
+    name: str
+    expression: Expression
+    direction: str
+    stop: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -218,7 +226,7 @@ def _with_loads(begun: Setting, samples: SampleTimes, source: str) -> Scene:
     if gravity is not None and body.mass is None and pulled:
         raise _fail("body", "mass", "missing; uniform_gravity needs it")
     acting = [load for load in resolved if load.acts() and load.uniform_field is None]
-    events = resolve_events(setting)
+    events = _resolved_events(setting)
     readers = [(load.title, formula) for load in acting for formula in load.formulas()]
     readers += [(f"event {event.name}", event.expression) for event in events]
     states = carried_states(resolve_states(setting), readers, config.output.record)
@@ -239,6 +247,19 @@ def _with_loads(begun: Setting, samples: SampleTimes, source: str) -> Scene:
         quaternion=[context.one] + [context.zero] * 3,
         angular_velocity=[context.zero] * 3,
     )
+
+
+def _resolved_events(setting: Setting) -> tuple[Event, ...]:
+    """Read the expressions of ``[[events]]``."""
+    found = []
+    for number, table in enumerate(setting.config.events):
+        here = setting.at("events", number)
+        expression = here.expression("expression", table.expression, jumps=False)
+        if not names_used(expression):
+            what = f'given "{table.expression}", which never changes; use {", ".join(setting.names)}'
+            raise here.fault("expression", what)
+        found.append(Event(table.name, expression, table.direction, table.action == "stop"))
+    return tuple(found)
 
 
 def _dated(setting: Setting, loads: Iterable[SceneLoad]) -> Setting:
@@ -292,4 +313,4 @@ def _translation(config: schema.Config, body: RigidBody, context: Any) -> tuple[
         )
     if body.mass is None:
         raise _fail("body", "mass", "missing; a body with a position or velocity needs it")
-    return flight_start(config, context)
+    return starts.flight_start(config, context)

@@ -6,11 +6,10 @@ import math
 from collections.abc import Sequence
 
 from rigidsim.errors import Problem
-from rigidsim.scene.events import Event
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import Constant, Expression, Name, Operation, operations
 from rigidsim.scene.paths import numbers
-from rigidsim.scene.scene import Scene
+from rigidsim.scene.scene import Event, Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.units import time_unit
 
