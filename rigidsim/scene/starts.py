@@ -237,9 +237,7 @@ for _way in (
 Rotation = tuple[list[list[float]], list[float]]
 """Matrix from a frame to GCRF, and the frame's angular velocity in GCRF (rad/s)."""
 ROTATIONS: dict[str, Callable[[Epoch], Rotation]] = {}
-"""By name of a frame, registered by what knows the Earth's orientation, in the room of mechanics; the others are
-GCRF's axes, to 0.02 arcsec.
-"""
+"""By name of a frame, entered from the room of mechanics; others are GCRF's axes, to 0.02 arcsec."""
 PROPAGATORS: dict[str, Callable[[TwoLineElements, Epoch], tuple[list[float], list[float]]]] = {}
 """SGP4 by its name: to position and velocity in TEME, m and m/s. Both raise ``ValueError``."""
 _STRENGTH = f"{EARTH.gravitational_parameter:g} m^3/s^2"
