@@ -110,7 +110,7 @@ DECAYING = [  # of the same test cases: down within the hour
 @pytest.mark.parametrize(
     ("initial", "others", "texts"),
     [
-        ({"tle": LINES, "position": [1, 0, 0]}, {}, ["position", "given with tle"]),
+        ({"tle": LINES, "position": [1, 0, 0]}, {}, ["position", "given position with tle"]),
         (
             {"tle": LINES},
             {"loads": [EARTH | {"gravitational_parameter": "4.28e13 m^3/s^2"}]},
