@@ -184,7 +184,7 @@ class SteppedCarrier:
     def __init__(self, own: TaylorStepper, near: TaylorStepper, start: float, end: float, steps: int) -> None:
         self._near, self._pace = near, steps / (end - start)
         self._steppers = [near] if own is near else [near, own]
-        # of the motion, which may slide: where the latest stretch began, and where it ended
+        # of the motion, which may slide, by times: a stretch may be followed again from where it began
         self._marks = {start: [stepper.begun for stepper in self._steppers]}
 
     def advance(
@@ -220,7 +220,7 @@ class SteppedCarrier:
         # what moves in the run's arithmetic alone is rounded, too: a last bit shows that it does
         still = np.array([x == y for x, y in zip(marks[-1].state, known.state, strict=True)])
         own = np.where((own == states[:, 0]) & ~still, np.nextafter(own, np.inf), own)
-        self._marks = {first: self._marks[first], until: marks}
+        self._marks[until] = marks
         return own[:, None], moved, taken, time
 
     def _set(self, first: float, begin: float, state: np.ndarray) -> None:

@@ -175,6 +175,11 @@ FOLLOWED: dict[str, tuple[str, str, int, float, float]] = {
     "middle axis": (
         scene("[1, 2, 3]", "[1e-3, 1, 1e-3]", "40", WEAK), "integrator.tolerance = 1e-12", 60, 4, np.inf,
     ),
+    # the same growth for longer, of which projections take back a part within each stretch
+    "held": (
+        scene("[1, 2, 3]", "[1e-9, 1, 1e-9]", "150", WEAK),
+        "integrator.hold_invariants = true", 900, 1, np.inf,
+    ),
 }  # fmt: skip
 
 
