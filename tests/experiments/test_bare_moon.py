@@ -15,11 +15,6 @@ def _left_over(days, without=()):
     return {"rms": (rest**2).sum(axis=1).mean() ** 0.5, "components": abs(rest).max(axis=0)}
 
 
-@pytest.mark.slow
-def test_two_years_of_the_full_moon_are_de421s():
-    assert _left_over(732.0)["rms"] < 0.1
-
-
 @pytest.mark.campaign  # two minutes
 def test_fifty_years_and_what_each_effect_is_worth():
     """real amounts in arcsec, nothing fitted, of the published comparison (total rms over 1969-2019)."""
