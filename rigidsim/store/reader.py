@@ -173,9 +173,11 @@ class _Files(AbstractDataStore):
             }
             for name in _not_begun(file, self._paths[-1]) if self._status is not None else ():
                 del items[name]
-            return {name: self._variable(name, item) for name, item in items.items()}, attributes
+            rows = [root_attributes(path)["rows"] for path in self._paths] if len(self._paths) > 1 else []
+            starts = np.concatenate([[0], np.cumsum(rows, dtype=int)])
+            return {name: self._variable(name, item, starts) for name, item in items.items()}, attributes
 
-    def _variable(self, name: str, item: h5py.Dataset) -> xarray.Variable:
+    def _variable(self, name: str, item: h5py.Dataset, starts: np.ndarray) -> xarray.Variable:
         dims = [dim[0].name.lstrip("/") if len(dim) else name for dim in item.dims]
         values: Any
         if item.dtype.kind == "O":
@@ -183,10 +185,9 @@ class _Files(AbstractDataStore):
         elif len(self._paths) == 1 and item.size <= _AT_ONCE:
             values = item[()]
         else:
-            paths = self._paths if dims[0] == "time" else self._paths[:1]
-            rows = [len(item) if path == paths[0] else root_attributes(path)["rows"] for path in paths]
-            starts = np.concatenate([[0], np.cumsum(rows)])
-            values = indexing.LazilyIndexedArray(_Joined(paths, starts, name, item.shape[1:], item.dtype))
+            joins = len(self._paths) > 1 and dims[0] == "time"
+            along = (self._paths, starts) if joins else (self._paths[:1], np.array([0, len(item)]))
+            values = indexing.LazilyIndexedArray(_Joined(*along, name, item.shape[1:], item.dtype))
         return xarray.Variable(dims, values, _read_attributes(item.attrs), {"dtype": item.dtype})
 
 
