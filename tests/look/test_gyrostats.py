@@ -10,6 +10,8 @@ import xarray
 pytest.importorskip("matplotlib")
 pytest.importorskip("rerun")
 
+from support import config
+
 import rigidsim
 from rigidsim.look.gyrostats import Gyrostat
 from rigidsim.look.pages import leading
@@ -19,46 +21,19 @@ from rigidsim.look.timeline import write_timeline
 
 Read = Callable[[Path, str], dict[str, np.ndarray]]
 
-TWO_ROTORS = """
-name = "two"
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [0.3, 1, -0.2]
-[[rotors]]
-name = "free"
-axis = [1, 0, 1]
-moment = 0.1
-rate = 300
-[[rotors]]
-name = "kept"
-axis = [0, 1, 0]
-moment = 0.2
-rate = 2
-fixed = true
-[time]
-end = 20
-samples = 401
-"""
-DRIVEN = """
-name = "driven"
-[body]
-principal_moments = [50, 90, 110]
-[initial]
-angular_velocity = [0.001, 0, 0.6]
-[[rotors]]
-name = "wheel"
-axis = [1, 0, 0]
-moment = 0.1
-torque = "0.5*step(60 - t)"
-[[states]]
-name = "heat"
-unit = "J"
-derivative = "0.5*rate_wheel*step(60 - t)"
-[time]
-end = 120
-samples = 481
-"""
+TWO_ROTORS = config(
+    initial="angular_velocity = [0.3, 1, -0.2]",
+    time="end = 20\nsamples = 401",
+    more='[[rotors]]\nname = "free"\naxis = [1, 0, 1]\nmoment = 0.1\nrate = 300\n'
+    '[[rotors]]\nname = "kept"\naxis = [0, 1, 0]\nmoment = 0.2\nrate = 2\nfixed = true',
+)
+DRIVEN = config(
+    "principal_moments = [50, 90, 110]",
+    "angular_velocity = [0.001, 0, 0.6]",
+    time="end = 120\nsamples = 481",
+    more='[[rotors]]\nname = "wheel"\naxis = [1, 0, 0]\nmoment = 0.1\ntorque = "0.5*step(60 - t)"\n'
+    '[[states]]\nname = "heat"\nunit = "J"\nderivative = "0.5*rate_wheel*step(60 - t)"',
+)
 
 
 @pytest.fixture(scope="module")

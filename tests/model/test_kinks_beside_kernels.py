@@ -11,38 +11,22 @@ import numpy as np
 import pytest
 from jplephem.ephem import Ephemeris
 from scipy.integrate import DOP853
-from support import cases, run_text
+from support import cases, config, matrices, run_text
 
 DAY, UNIT = 86400.0, 1e5
 MOMENTS = np.array([8.79e34, 8.7920e34, 8.7955e34])
 RATES, QUATERNION = np.array([1e-8, -2e-8, 1.3e-5]), np.array([0.9, 0.1, 0.2, 0.3])
-SCENE = """
-name = "moon"
-[body]
-principal_moments = [8.79e34, 8.7920e34, 8.7955e34]
-host = "moon"
-[initial]
-angular_velocity = [1e-8, -2e-8, 1.3e-5]
-quaternion = [0.9, 0.1, 0.2, 0.3]
-[ephemeris]
-kernel = "de421"
-[[loads]]
-kind = "gravity_gradient"
-name = "earth"
-source = "earth"
-[[loads]]
-kind = "torque"
-frame = "body"
-components = [0, "{torque}", 0]
-[time]
-epoch = "1969-07-20T12:00:00 TDB"
-end = "40 day"
-every = "1 day"
-[output]
-record = ["quaternion", "angular_velocity"]
-timeline = false
-estimate = {estimate}
-"""
+SCENE = config(
+    'principal_moments = [8.79e34, 8.7920e34, 8.7955e34]\nhost = "moon"',
+    "angular_velocity = [1e-8, -2e-8, 1.3e-5]\nquaternion = [0.9, 0.1, 0.2, 0.3]",
+    [
+        'kind = "gravity_gradient"\nname = "earth"\nsource = "earth"',
+        'kind = "torque"\nframe = "body"\ncomponents = [0, "{torque}", 0]',
+    ],
+    'epoch = "1969-07-20T12:00:00 TDB"\nend = "40 day"\nevery = "1 day"',
+    output='record = ["quaternion", "angular_velocity"]',
+    more='[ephemeris]\nkernel = "de421"',
+)
 KERNEL = Ephemeris(de421)
 Argument = Callable[[float, np.ndarray, np.ndarray], float]
 # by time, direction of the Earth in body axes and rates: a surface's argument; by that and a side: the torque
@@ -67,17 +51,6 @@ def place(seconds: float) -> np.ndarray:
     return -1000 * np.asarray(KERNEL.position("moon", 2440423.0, seconds / DAY))[:, 0]
 
 
-def rotation(q: np.ndarray) -> np.ndarray:
-    w, x, y, z = q / np.linalg.norm(q)
-    return np.eye(3) + 2 * np.array(
-        [
-            [-(y * y + z * z), x * y - w * z, x * z + w * y],
-            [x * y + w * z, -(x * x + z * z), y * z - w * x],
-            [x * z - w * y, y * z + w * x, -(x * x + y * y)],
-        ]
-    )
-
-
 def truth(name: str, days: float) -> tuple[np.ndarray, int]:
     """The rotation matrix at the end, and how many surfaces were crossed."""
     _, argument, torque = CASES[name]
@@ -98,7 +71,7 @@ def truth(name: str, days: float) -> tuple[np.ndarray, int]:
         )
         return np.concatenate([turned.ravel(), matrix @ given / 1e29]) * UNIT
 
-    y = np.concatenate([rotation(QUATERNION).ravel(), np.zeros(3)])
+    y = np.concatenate([matrices(QUATERNION).ravel(), np.zeros(3)])
     y[9:] = y[:9].reshape(3, 3) @ (MOMENTS * RATES) / 1e29
     t = 0.0
     first = parts(0.0, y)[-1]
@@ -131,7 +104,7 @@ def truth(name: str, days: float) -> tuple[np.ndarray, int]:
 def test_steps_end_at_kinks_and_at_edges(name: str) -> None:
     matrix, crossed = truth(name, 40)
     assert crossed >= 2
-    run = run_text(SCENE.format(torque=CASES[name][0], estimate="true"), estimate=True)
-    error = matrix - rotation(run.dataset["quaternion"].values[-1])
+    run = run_text(SCENE.format(torque=CASES[name][0]), estimate=True)
+    error = matrix - matrices(run.dataset["quaternion"].values[-1])
     assert np.abs(error).max() < 1e-11
     assert run.summary["accuracy"]["estimated_attitude_error"] < 1e-12

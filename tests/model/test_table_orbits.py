@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
-from support import IMPATIENT, law, run_text, same_bits
+from support import IMPATIENT, config, law, run_text, same_bits
 
 import rigidsim
 from rigidsim import ConfigError
@@ -19,26 +19,14 @@ KEPLER = (
     '{semi_major_axis = "1 au", eccentricity = 0.1, inclination = "20 deg", ascending_node = 0.7, '
     f"periapsis = 1.2, mean_anomaly = 0.3, node_rate = {NODE!r}, periapsis_rate = {PERIAPSIS!r}}}"
 )
-PLANET = """
-name = "planet"
-[body]
-principal_moments = [0.95, 0.96, 1]
-[initial]
-angular_velocity = [0, 0, "300 deg/day"]
-euler_angles = [0, "25 deg", 0]
-[[loads]]
-kind = "gravity_gradient"
-gravitational_parameter = "1.32712440018e20 m^3/s^2"
-orbit = %s
-[frame]
-reference = "orbit"
-[time]
-start = "10 day"
-end = "210 day"
-every = "10 day"
-[output]
-record = ["quaternion", "momentum_axis", "obliquity", "node_longitude"]
-"""
+PLANET = config(
+    "principal_moments = [0.95, 0.96, 1]",
+    'angular_velocity = [0, 0, "300 deg/day"]\neuler_angles = [0, "25 deg", 0]',
+    'kind = "gravity_gradient"\ngravitational_parameter = "1.32712440018e20 m^3/s^2"\norbit = %s',
+    'start = "10 day"\nend = "210 day"\nevery = "10 day"',
+    output='record = ["quaternion", "momentum_axis", "obliquity", "node_longitude"]',
+    more='[frame]\nreference = "orbit"',
+)
 
 
 def table(every: float, anomaly: bool = True) -> str:
@@ -109,8 +97,7 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> rigidsim.Run:
     (folder / "orbit.csv").write_text(table(4.0), encoding="utf-8")
     path = folder / "planet.toml"
     path.write_text(PLANET % '{table = "orbit.csv"}', encoding="utf-8")
-    short = ["time.end='100 day'", "output.timeline=false", "output.estimate=false"]
-    run = rigidsim.run(rigidsim.load(path, overrides=short), out=folder)
+    run = rigidsim.run(rigidsim.load(path, overrides=["time.end='100 day'"]), out=folder)
     (folder / "orbit.csv").unlink()
     return rigidsim.resume(run.folder.path, until="210 day", tuning=IMPATIENT)
 
@@ -123,11 +110,8 @@ def test_a_prolonged_run_is_the_run_in_one_go_and_verified_without_the_file(save
 
 
 def test_what_a_table_can_not_be_combined_with() -> None:
-    more = "[output]\nlyapunov = true"
-    text = by_table(40.0).split("[output]")[0] + more + "\n[tables" + by_table(40.0).split("[tables")[1]
-    with pytest.raises(ConfigError, match="table") as caught:
-        prepare(rigidsim.parse(text))
-    assert "edges of a table" in str(caught.value)
+    with pytest.raises(ConfigError, match="edges of a table"):
+        prepare(rigidsim.parse(by_table(40.0), overrides=["output.lyapunov=true"]))
 
 
 @pytest.mark.slow

@@ -5,41 +5,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import seeds
+from support import config, seeds
 
 import rigidsim
 
-SCENE = """
-name = "ranges"
-[body]
-principal_moments = [1, 2, 2.5]
-mass = 10
-[initial]
-angular_velocity = [1e-3, 0, 1e-3]
-position = ["7000 km", 0, 0]
-velocity = [0, "7.5 km/s", 0]
-[[loads]]
-name = "earth"
-kind = "central_gravity"
-gravitational_parameter = "398600.4418 km^3/s^2"
-radius = "6378 km"
-figure = {J2 = 0.001, radius = "6378 km", pole = [0, 0, 1]}
-[[loads]]
-kind = "viscous_torque"
-coefficients = [1e-6, 1e-6, 1e-6]
-[[loads]]
-kind = "torque"
-components = ["1e-16*altitude", "0", "0"]
-[time]
-end = 1
-samples = 2
-[output]
-record = ["angular_velocity"]
-timeline = false
-estimate = false
-[sweep]
-impossible = "mark"
-"""
+SCENE = config(
+    "principal_moments = [1, 2, 2.5]\nmass = 10",
+    'angular_velocity = [1e-3, 0, 1e-3]\nposition = ["7000 km", 0, 0]\nvelocity = [0, "7.5 km/s", 0]',
+    [
+        'kind = "central_gravity"\nname = "earth"\ngravitational_parameter = "398600.4418 km^3/s^2"\n'
+        'radius = "6378 km"\nfigure = {J2 = 0.001, radius = "6378 km", pole = [0, 0, 1]}',
+        'kind = "viscous_torque"\ncoefficients = [1e-6, 1e-6, 1e-6]',
+        'kind = "torque"\ncomponents = ["1e-16*altitude", "0", "0"]',
+    ],
+    "end = 1\nsamples = 2",
+    output='record = ["angular_velocity"]',
+    more='[sweep]\nimpossible = "mark"',
+)
 # key, what is allowed by docs/config.md, ends between which values are drawn
 KEYS = [
     ("loads[0].figure.J2", lambda x: -1 <= x <= 0.5, (-2.0, 1.5)),

@@ -4,47 +4,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import IMPATIENT
+from support import IMPATIENT, config
 
 import rigidsim
 
 # spins about its middle axis and turns over: its spin leaves the cone about that axis and comes back
-FLIPPING = """
-name = "flipping"
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [0.1, 1.0, 0.05]
-[frame]
-figure_axis = "y"
-[time]
-end = 60
-samples = 241
-[output]
-record = ["polar_motion", "angular_velocity"]
-timeline = false
-estimate = false
-"""
+FLIPPING = config(
+    initial="angular_velocity = [0.1, 1.0, 0.05]",
+    time="end = 60\nsamples = 241",
+    output='record = ["polar_motion", "angular_velocity"]',
+    more='[frame]\nfigure_axis = "y"',
+)
 # falls over from upright: it has no node as long as it hasn't left the vertical
-UPRIGHT = """
-name = "upright"
-[body]
-principal_moments = [2, 2, 1]
-mass = 1
-center_of_mass = [0, 0, 1]
-[initial]
-angular_velocity = [{push}, 0, 1]
-[[loads]]
-kind = "uniform_gravity"
-acceleration = [0, 0, -1]
-[time]
-end = 3
-samples = 13
-[output]
-record = ["precession_angle", "tilt"]
-timeline = false
-estimate = false
-"""
+UPRIGHT = config(
+    "principal_moments = [2, 2, 1]\nmass = 1\ncenter_of_mass = [0, 0, 1]",
+    "angular_velocity = [{push}, 0, 1]",
+    'kind = "uniform_gravity"\nacceleration = [0, 0, -1]',
+    "end = 3\nsamples = 13",
+    output='record = ["precession_angle", "tilt"]',
+)
 
 
 def undefined(run: rigidsim.Run, name: str) -> np.ndarray:
@@ -90,6 +68,3 @@ def test_members_of_a_batch_are_warned_of_as_single_runs_are(tmp_path: Path) -> 
         bit = 1 << meanings.index("undefined")
         codes[batch] = [bool(bits & bit) for bits in warnings.values.tolist()]
     assert codes == {True: [True, False], False: [True, False]}
-
-
-# ---- a run that doesn't fit on its disk is refused before it begins, and ``plan`` warns of it

@@ -4,35 +4,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support import config
 from typer.testing import CliRunner
 
 import rigidsim
 from rigidsim.cli.app import app
 from rigidsim.workflows.sweeps.members import single_member
 
-SPINNING = """
-name = "precessing"
-[body]
-principal_moments = [0.98, 0.98, 1]
-[initial]
-angular_velocity = [0, 0, 60]
-euler_angles = [0.3, "35 deg", 0]
-[[loads]]
-kind = "gravity_gradient"
-gravitational_parameter = 1
-orbit = {semi_major_axis = 1, eccentricity = 0.2, inclination = "10 deg"}
-[model]
-level = "spin_averaged"
-[time]
-end = 10
-samples = 3
-[output]
-record = ["momentum_axis"]
-timeline = false
-[sweep]
-tile = 1
-axes."initial.euler_angles[1]" = {values = ["20 deg", "50 deg"], name = "lean"}
-"""
+SPINNING = config(
+    "principal_moments = [0.98, 0.98, 1]",
+    'angular_velocity = [0, 0, 60]\neuler_angles = [0.3, "35 deg", 0]',
+    'kind = "gravity_gradient"\ngravitational_parameter = 1\n'
+    'orbit = {semi_major_axis = 1, eccentricity = 0.2, inclination = "10 deg"}',
+    "end = 10\nsamples = 3",
+    output='record = ["momentum_axis"]',
+    more='[model]\nlevel = "spin_averaged"\n[sweep]\ntile = 1\n'
+    'axes."initial.euler_angles[1]" = {values = ["20 deg", "50 deg"], name = "lean"}',
+    name="precessing",
+    estimate=True,
+)
 DAMPED = SPINNING.replace(
     "[model]", '[[loads]]\nkind = "viscous_torque"\ncoefficients = [1e-4, 1e-4, 2e-4]\n[model]'
 ).replace("[0.98, 0.98, 1]", "[0.7, 0.8, 1]")

@@ -7,33 +7,26 @@ import pytest
 
 pytest.importorskip("rerun")
 
+from support import config
+
 import rigidsim
 from rigidsim.look.stages.registry import build_picture
 from rigidsim.workflows.view import runs_of
 
 SPIN, SIGMA = 0.7, 0.01  # rad/s, rad
 TIMES = np.linspace(0.5, 9.5, 19)
-BALL = """
-name = "ball"
-[body]
-principal_moments = [2, 2, 2]
-[initial]
-angular_velocity = [0, 0, 0.69]
-[frame]
-figure_axis = "x"
-[output]
-record = ["angular_velocity"]
-[time]
-end = 10
-[fit]
-parameters = ["initial.attitude[2]", "initial.angular_velocity[2]"]
-[[fit.data]]
-file = "turn.csv"
-observable = "euler_angles"
-columns = ["a", "b", "c"]
-unit = "deg"
-sigma = "0.01 rad"
-"""
+BALL = config(
+    "principal_moments = [2, 2, 2]",
+    "angular_velocity = [0, 0, 0.69]",
+    time="end = 10",
+    output='record = ["angular_velocity"]',
+    more='[frame]\nfigure_axis = "x"\n'
+    '[fit]\nparameters = ["initial.attitude[2]", "initial.angular_velocity[2]"]\n'
+    '[[fit.data]]\nfile = "turn.csv"\nobservable = "euler_angles"\ncolumns = ["a", "b", "c"]\n'
+    'unit = "deg"\nsigma = "0.01 rad"',
+    name="ball",
+    estimate=True,
+)
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import angles_between, parts_in
+from support import angles_between, config, parts_in
 from typer.testing import CliRunner
 
 import rigidsim
@@ -152,29 +152,18 @@ def test_what_is_left_out_of_an_elastic_body() -> None:
     ]
 
 
-AVERAGED = """
-name = "precession"
-[body]
-preset = "earth"
-[initial]
-angular_velocity = [0, 0, "7.292115e-5 rad/s"]
-euler_angles = ["180 deg", "84381.406 arcsec", 0]
-[[loads]]
-kind = "gravity_gradient"
-name = "sun"
-gravitational_parameter = "1.32712440018e20"
-orbit = {semi_major_axis = "1.495978707e11", eccentricity = 0.016709}
-[[loads]]
-kind = "gravity_gradient"
-name = "moon"
-gravitational_parameter = "4.902800e12"
-orbit = {semi_major_axis = "3.84399e8", eccentricity = 0.0549}
-[time]
-end = "100 yr"
-samples = 41
-[model]
-level = "orbit_averaged"
-"""
+LOAD = 'kind = "gravity_gradient"\nname = "{}"\ngravitational_parameter = "{}"\norbit = {{{}}}'
+AVERAGED = config(
+    'preset = "earth"',
+    'angular_velocity = [0, 0, "7.292115e-5 rad/s"]\neuler_angles = ["180 deg", "84381.406 arcsec", 0]',
+    [
+        LOAD.format("sun", "1.32712440018e20", 'semi_major_axis = "1.495978707e11", eccentricity = 0.016709'),
+        LOAD.format("moon", "4.902800e12", 'semi_major_axis = "3.84399e8", eccentricity = 0.0549'),
+    ],
+    'end = "100 yr"\nsamples = 41',
+    more='[model]\nlevel = "orbit_averaged"',
+    estimate=True,
+)
 
 
 @pytest.mark.slow
