@@ -21,25 +21,12 @@ from rigidsim.accuracy.comparison import angles_between
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import try_setting
 
-FREE = """name = "free"
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [0.3, 1.0, 0.5]
-euler_angles = [0.2, 1.1, 0.7]
-"""
-CHAOTIC = """name = "chaotic"
-[body]
-principal_moments = [1, 1.4, 2]
-mass = 1
-center_of_mass = [0.3, 0.2, 0.5]
-[initial]
-angular_velocity = [0.3, 1.0, 0.5]
-euler_angles = [0.2, 1.1, 0.7]
-[[loads]]
-kind = "uniform_gravity"
-acceleration = [0, 0, -3]
-"""
+FREE = config(name="free", estimate=True)
+CHAOTIC = config(
+    "principal_moments = [1, 1.4, 2]\nmass = 1\ncenter_of_mass = [0.3, 0.2, 0.5]",
+    loads='kind = "uniform_gravity"\nacceleration = [0, 0, -3]',
+    estimate=True,
+)
 
 
 def experiment(text: str, accuracy: Any, end: Any, *more: str, samples: int = 5) -> rigidsim.Experiment:

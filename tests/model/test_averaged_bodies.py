@@ -4,31 +4,21 @@ import math
 
 import numpy as np
 import pytest
-from support import run_text
+from support import config, run_text
 
 import rigidsim
 
 AU, SUN, EARTH, MOON = 149597870700.0, 1.32712440018e20, 3.986004418e14, 4.9028e12
 DAY = 86400.0
 SPIN = 3600.0  # deg a day
-SCENE = """
-name = "planet"
-[body]
-principal_moments = ["8.010e37 kg m^2", "8.012e37 kg m^2", "8.0365e37 kg m^2"]
-mass = "5.97219e24 kg"
-%s
-[initial]
-euler_angles = [0, "23.44 deg", 0]
-angular_velocity = [0, 0, "%s deg/day"]
-%s
-[time]
-end = "60 day"
-samples = 31
-[model]
-level = "%s"
-[output]
-record = ["momentum_axis", "point_mass_position", "orbital_energy"]
-"""
+SCENE = config(
+    'principal_moments = ["8.010e37 kg m^2", "8.012e37 kg m^2", "8.0365e37 kg m^2"]\n'
+    'mass = "5.97219e24 kg"\n%s',
+    'euler_angles = [0, "23.44 deg", 0]\nangular_velocity = [0, 0, "%s deg/day"]\n%s',
+    time='end = "60 day"\nsamples = 31',
+    output='record = ["momentum_axis", "point_mass_position", "orbital_energy"]',
+    more='[model]\nlevel = "%s"',
+)
 SUN_AND_EARTH = f"""
 [[bodies]]
 name = "sun"

@@ -8,7 +8,7 @@ import heyoka as hy
 import numpy as np
 import pytest
 import xarray
-from support import law, run_text
+from support import config, law, run_text
 
 import rigidsim
 from rigidsim import ConfigError
@@ -17,36 +17,18 @@ from rigidsim.solve.problem import prepare
 EPS = 2.0**-52
 AU, SUN, EARTH, MOON = 149597870700.0, 1.32712440018e20, 3.986004418e14, 4.9028e12
 DAY = 86400.0
-PLANET = """
-name = "planet"
-[body]
-principal_moments = ["8.010e37 kg m^2", "8.012e37 kg m^2", "8.0365e37 kg m^2"]
-mass = "5.97219e24 kg"
-%s
-[initial]
-euler_angles = [0, "23.44 deg", 0]
-angular_velocity = [0, 0, "36 deg/day"]
-%s
-[time]
-end = "40 day"
-samples = 9
-"""
-BODIES = f"""
-[[bodies]]
-name = "sun"
-gravitational_parameter = {SUN!r}
-[[bodies]]
-name = "earth"
-gravitational_parameter = {EARTH!r}
-[bodies.orbit]
-about = "sun"
-semi_major_axis = "1 au"
-eccentricity = 0.3
-inclination = "7 deg"
-ascending_node = 0.4
-periapsis = 1.1
-mean_anomaly = 6.1
-"""
+PLANET = config(
+    'principal_moments = ["8.010e37 kg m^2", "8.012e37 kg m^2", "8.0365e37 kg m^2"]\n'
+    'mass = "5.97219e24 kg"\n%s',
+    'euler_angles = [0, "23.44 deg", 0]\nangular_velocity = [0, 0, "36 deg/day"]\n%s',
+    time='end = "40 day"\nsamples = 9',
+)
+BODIES = (
+    f'[[bodies]]\nname = "sun"\ngravitational_parameter = {SUN!r}\n'
+    f'[[bodies]]\nname = "earth"\ngravitational_parameter = {EARTH!r}\n'
+    'orbit = {about = "sun", semi_major_axis = "1 au", eccentricity = 0.3, inclination = "7 deg", '
+    "ascending_node = 0.4, periapsis = 1.1, mean_anomaly = 6.1}\n"
+)
 THIRD = f"""
 [[bodies]]
 name = "moon"
@@ -123,20 +105,11 @@ def test_one_mass_is_keplers_closed_form() -> None:
 
 # --- six degrees of freedom: a long body about a planet, its shape felt in its path ----------------
 
-DUMBBELL = """
-name = "dumbbell"
-[body]
-principal_moments = ["1e13 kg m^2", "2e14 kg m^2", "2.05e14 kg m^2"]
-mass = "1000 kg"
-%s
-[initial]
-angular_velocity = [1e-3, 2e-4, 8e-4]
-quaternion = [0.9, 0.2, -0.1, 0.3]
-%s
-[time]
-end = "3 h"
-samples = 13
-"""
+DUMBBELL = config(
+    'principal_moments = ["1e13 kg m^2", "2e14 kg m^2", "2.05e14 kg m^2"]\nmass = "1000 kg"\n%s',
+    "angular_velocity = [1e-3, 2e-4, 8e-4]\nquaternion = [0.9, 0.2, -0.1, 0.3]\n%s",
+    time='end = "3 h"\nsamples = 13',
+)
 POSITION, VELOCITY = [9.0e6, 1.0e5, -4.0e5], [-300.0, 6500.0, 900.0]
 ATTRACTOR = f'[[bodies]]\nname = "planet"\ngravitational_parameter = {EARTH!r}\nposition = [0, 0, 0]\n'
 FLIGHT = f"position = {POSITION}\nvelocity = {VELOCITY}\n"

@@ -9,35 +9,26 @@ import numpy as np
 import pytest
 from equations import EPS
 from scipy.integrate import quad
-from support import EPSILON, cases
+from support import EPSILON, cases, config
 
 import rigidsim
 
-SPUN = """name = "spun"
-[parameters]
-w = "{width}"
-[body]
-principal_moments = [1, 1.5, 2]
-[initial]
-angular_velocity = [0, 0, {spin}]
-[[loads]]
-kind = "torque"
-components = [0, 0, "{torque}"]
-[time]
-end = 100
-samples = 11
-[integrator]
-precision = "{precision}"
-[output]
-record = ["angular_velocity", "work"]
-"""
+SPUN = config(
+    "principal_moments = [1, 1.5, 2]",
+    "angular_velocity = [0, 0, {spin}]",
+    'kind = "torque"\ncomponents = [0, 0, "{torque}"]',
+    "end = 100\nsamples = 11",
+    'precision = "{precision}"',
+    'record = ["angular_velocity", "work"]',
+    '[parameters]\nw = "{width}"',
+    estimate=True,
+)
 
 
 def spun(torque: str, runs: Path, *, width: str = "1", spin: str = "0.5", precision: str = "double",
          more: str = "", loads: Any = ()) -> rigidsim.Run:  # fmt: skip
     text = SPUN.format(width=width, torque=torque, spin=spin, precision=precision) + more
-    experiment = rigidsim.parse(text, overrides=["output.timeline=false"])
-    return rigidsim.run(experiment, out=runs, force=True, loads=loads)
+    return rigidsim.run(rigidsim.parse(text), out=runs, force=True, loads=loads)
 
 
 @pytest.mark.parametrize(
@@ -113,32 +104,18 @@ def test_orbits_through_air_carry_what_they_need(
     speed: str, record: str, carried: set[str], runs: Path
 ) -> None:
     """And the summary says what isn't monitored."""
-    text = f"""name = "orbit"
-[body]
-principal_moments = [1, 2, 3]
-mass = 4
-[[body.surfaces]]
-radius = 0.2
-[initial]
-position = [6778136, 0, 0]
-velocity = [1, {speed}, 0]
-angular_velocity = [0.01, 0.02, 0.03]
-[[loads]]
-kind = "central_gravity"
-gravitational_parameter = 3.986004418e14
-radius = 6378136
-[[loads]]
-kind = "drag"
-density = 4e-12
-altitude = "400 km"
-scale_height = "60 km"
-[time]
-end = 60
-samples = 2
-[output]
-{record}
-"""
-    run = rigidsim.run(rigidsim.parse(text, overrides=["output.timeline=false"]), out=runs, force=True)
+    text = config(
+        "principal_moments = [1, 2, 3]\nmass = 4\n[[body.surfaces]]\nradius = 0.2",
+        f"position = [6778136, 0, 0]\nvelocity = [1, {speed}, 0]\nangular_velocity = [0.01, 0.02, 0.03]",
+        [
+            'kind = "central_gravity"\ngravitational_parameter = 3.986004418e14\nradius = 6378136',
+            'kind = "drag"\ndensity = 4e-12\naltitude = "400 km"\nscale_height = "60 km"',
+        ],
+        "end = 60\nsamples = 2",
+        output=record,
+        estimate=True,
+    )
+    run = rigidsim.run(rigidsim.parse(text), out=runs, force=True)
     assert {"work", "pace"} & set(run.summary["states"]) == carried
     assert ("energy_balance" in run.summary["invariants"]) == ("work" in carried)
     assert list(run.summary["unwatched"]) == ([] if "work" in carried else ["energy_balance"])

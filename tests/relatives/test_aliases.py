@@ -8,7 +8,7 @@ the body and, W faster, in space.
 import numpy as np
 import pytest
 import xarray
-from support import run_text, seeds
+from support import config, run_text, seeds
 
 import rigidsim
 
@@ -47,24 +47,14 @@ def test_lines_of_random_samplings(seed: int) -> None:
     assert not any(line.can_be_alias for line in resolved) or slow / 2 > nyquist
 
 
-PLANET = """
-name = "planet"
-[body]
-principal_moments = [{a}, {b}, 1]
-[initial]
-euler_angles = [0, "{tilt} deg", 0]
-angular_velocity = [0, 0, {spin}]
-[[loads]]
-kind = "gravity_gradient"
-gravitational_parameter = 1.32712440018e20
-orbit = {{semi_major_axis = "{distance} au", eccentricity = {eccentricity}}}
-[time]
-end = "{end} day"
-every = "{every} day"
-[output]
-record = ["obliquity", "node_longitude"]
-estimate = false
-"""
+PLANET = config(
+    "principal_moments = [{a}, {b}, 1]",
+    'euler_angles = [0, "{tilt} deg", 0]\nangular_velocity = [0, 0, {spin}]',
+    'kind = "gravity_gradient"\ngravitational_parameter = 1.32712440018e20\n'
+    'orbit = {{semi_major_axis = "{distance} au", eccentricity = {eccentricity}}}',
+    'end = "{end} day"\nevery = "{every} day"',
+    output='record = ["obliquity", "node_longitude"]',
+)
 
 
 @pytest.mark.parametrize("seed", seeds(1, 50))

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from support import run_text, seeds, unoptimised_code
+from support import config, run_text, seeds, unoptimised_code
 
 import rigidsim
 from rigidsim.model.kinematics import Kinematics
@@ -26,22 +26,14 @@ ERRORS = [
     OSError, LookupError, ArithmeticError, ValueError,
 ]  # fmt: skip
 PLACES = ["reads", "torque", "amplitude", "observable"]
-TEXT = """
-name = "own_errors"
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [0.1, 0.2, 0.3]
-{initial}
-[[loads]]
-kind = "raising"
-[time]
-end = 5
-samples = 6
-[output]
-record = ["angular_velocity", "raising"]
-{more}
-"""
+TEXT = config(
+    initial="angular_velocity = [0.1, 0.2, 0.3]\n{initial}",
+    loads='kind = "raising"',
+    time="end = 5\nsamples = 6",
+    output='record = ["angular_velocity", "raising"]',
+    more="{more}",
+    estimate=True,
+)
 SWEEP = """
 [sweep]
 keep = ["final"]

@@ -9,41 +9,23 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from support import run_text, seeds, unoptimised_code
+from support import config, run_text, seeds, unoptimised_code
 
 from rigidsim.errors import ConfigError
 
 LIGHT, STRENGTH, DISTANCE = 299792458.0, 1.32712440018e20, 149597870700.0
-TEXT = """
-name = "plates"
-[body]
-principal_moments = {moments}
-{plates}
-[initial]
-angular_velocity = {rates}
-quaternion = {quaternion}
-[[loads]]
-kind = "gravity_gradient"
-name = "sun"
-gravitational_parameter = "1.32712440018e20 m^3/s^2"
-orbit = {{semi_major_axis = "149597870.7 km"}}
-[[loads]]
-kind = "radiation_pressure"
-light = "sun"
-irradiance = {irradiance}
-[time]
-end = {end}
-samples = 5
-[output]
-record = ["angular_velocity", "quaternion"]
-"""
-PLATE = """[[body.surfaces]]
-normal = {}
-area = {}
-position = {}
-specular = {}
-diffuse = {}
-"""
+TEXT = config(
+    "principal_moments = {moments}\n{plates}",
+    "angular_velocity = {rates}\nquaternion = {quaternion}",
+    [
+        'kind = "gravity_gradient"\nname = "sun"\norbit = {{semi_major_axis = "149597870.7 km"}}\n'
+        'gravitational_parameter = "1.32712440018e20 m^3/s^2"',
+        'kind = "radiation_pressure"\nlight = "sun"\nirradiance = {irradiance}',
+    ],
+    "end = {end}\nsamples = 5",
+    output='record = ["angular_velocity", "quaternion"]',
+)
+PLATE = "[[body.surfaces]]\nnormal = {}\narea = {}\nposition = {}\nspecular = {}\ndiffuse = {}\n"
 
 
 class Satellite:

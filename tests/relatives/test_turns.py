@@ -15,30 +15,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from support import angle_between, run_text, seeds, unoptimised_code
+from support import angle_between, config, run_text, seeds, unoptimised_code
 
 import rigidsim
 from rigidsim.errors import ConfigError
 from rigidsim.solve.problem import prepare
 
-TEXT = """
-name = "turns"
-[body]
-principal_moments = {moments}
-[initial]
-angular_velocity = {rates}
-euler_angles = {angles}
-{more}
-[[loads]]
-kind = "torque"
-components = [{torque}]
-[time]
-end = {end}
-samples = {samples}
-[output]
-record = ["angular_velocity", "quaternion"{record}]
-lyapunov = {lyapunov}
-"""
+TEXT = config(
+    "principal_moments = {moments}",
+    "angular_velocity = {rates}\neuler_angles = {angles}\n{more}",
+    'kind = "torque"\ncomponents = [{torque}]',
+    "end = {end}\nsamples = {samples}",
+    output='record = ["angular_velocity", "quaternion"{record}]\nlyapunov = {lyapunov}',
+)
 
 
 @dataclass
@@ -165,9 +154,9 @@ def test_motions_and_announced_errors(seed: int) -> None:
     if draw.random() < 0.5:
         drawn.rates[:2], drawn.torque[:2] = 0, ["0.0", "0.0"]
     precision = draw.choice(["double", "extended", "quadruple"])
-    run = run_text(drawn.text(10.0, more=f'[integrator]\nprecision = "{precision}"'))
+    run = run_text(drawn.text(10.0), f'integrator.precision="{precision}"')
     checked(run, drawn, 1e-8)
-    loose = run_text(drawn.text(10.0, more="[integrator]\ntolerance = 1e-8"), estimate=True)
+    loose = run_text(drawn.text(10.0), "integrator.tolerance=1e-8", estimate=True)
     quaternions = (x.dataset.quaternion.values for x in (run, loose))
     announced = loose.summary["accuracy"]["estimated_attitude_error"]
     assert angle_between(*quaternions)[-1] < 10 * announced < 1e-3

@@ -10,7 +10,7 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 import pytest
-from support import run_text, seeds, unoptimised_code
+from support import config, run_text, seeds, unoptimised_code
 
 import rigidsim
 from rigidsim.model.observables import Observable, only_when_named
@@ -18,18 +18,11 @@ from rigidsim.scene.registry import OBSERVABLES, register_observable
 
 NAME = "constant_where_defined"
 LEAST = [0.0]
-TEXT = f"""
-name = "undefined_drifts"
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [0.5, 0.4, {{rate}}]
-[time]
-end = 20
-samples = 41
-[output]
-record = ["angular_velocity", "{NAME}"]
-"""
+TEXT = config(
+    initial="angular_velocity = [0.5, 0.4, {rate}]",
+    time="end = 20\nsamples = 41",
+    output=f'record = ["angular_velocity", "{NAME}"]',
+)
 SWEEP = '[sweep]\nkeep = ["extremes"]\naxes."initial.angular_velocity[2]" = {values = [0.1, 0.3, 0.5, 0.7]}'
 
 

@@ -8,7 +8,7 @@ import json
 
 import numpy as np
 import pytest
-from support import run_text, seeds
+from support import config, run_text, seeds
 
 from rigidsim.look.figures.catalogue import available
 from rigidsim.look.record import scene_of
@@ -16,24 +16,12 @@ from rigidsim.look.stages.bodies import source_arrows
 from rigidsim.look.stages.registry import build_picture
 
 UNITS = {"m/s^2": 1.0, "cm/s^2": 0.01, "km/s^2": 1000.0, "mm/s^2": 0.001, "": 1.0}
-TEXT = """
-name = "held"
-[body]
-principal_moments = [1, 1, 0.5]
-mass = 2
-center_of_mass = {arm}
-[initial]
-{start}
-angular_velocity = [0.1, 0, 5]
-{loads}
-[time]
-end = 0.5
-samples = 11
-[output]
-record = ["quaternion", "angular_velocity"{more}]
-estimate = false
-timeline = false
-"""
+TEXT = config(
+    "principal_moments = [1, 1, 0.5]\nmass = 2\ncenter_of_mass = {arm}",
+    "{start}\nangular_velocity = [0.1, 0, 5]\n{loads}",
+    time="end = 0.5\nsamples = 11",
+    output='record = ["quaternion", "angular_velocity"{more}]',
+)
 
 
 def component(rng: np.random.Generator) -> tuple[str, float]:

@@ -14,22 +14,12 @@ from rigidsim import ConfigError
 from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing
 
-FLIPS = """
-name = "flips"
-[body]
-principal_moments = [1, 2, 3]
-[initial]
-angular_velocity = [0.0625, 1, 0.0625]
-euler_angles = [0.1, 1, 0.2]
-[time]
-end = 200
-samples = {samples}
-"""
-FLIP = """
-[[events]]
-name = "flip"
-expression = "wy"
-"""
+FLIPS = config(
+    "principal_moments = [1, 2, 3]",
+    "angular_velocity = [0.0625, 1, 0.0625]\neuler_angles = [0.1, 1, 0.2]",
+    time="end = 200\nsamples = {samples}",
+)
+FLIP = '[[events]]\nname = "flip"\nexpression = "wy"\n'
 
 
 def flip_interval() -> mpmath.mpf:
@@ -124,34 +114,15 @@ def test_a_coin_stops_when_it_lands(runs: Path) -> None:
 
 
 def test_events_read_attitude_position_and_time() -> None:
-    text = """
-    name = "throw"
-    [parameters]
-    h = 1
-    [body]
-    shape = "sphere"
-    mass = 1
-    radius = 0.1
-    [initial]
-    angular_velocity = [0, 0, 3]
-    velocity = [0, 0, 10]
-    [[loads]]
-    kind = "uniform_gravity"
-    acceleration = [0, 0, -10]
-    [time]
-    end = 2
-    samples = 3
-    [[events]]
-    name = "top"
-    expression = "vz"
-    [[events]]
-    name = "rising"
-    expression = "z - h"
-    direction = "up"
-    [[events]]
-    name = "turned"
-    expression = "qz - sin(3*t/2) + t - 1"
-    """
+    text = config(
+        'shape = "sphere"\nmass = 1\nradius = 0.1',
+        "angular_velocity = [0, 0, 3]\nvelocity = [0, 0, 10]",
+        'kind = "uniform_gravity"\nacceleration = [0, 0, -10]',
+        "end = 2\nsamples = 3",
+        more='[parameters]\nh = 1\n[[events]]\nname = "top"\nexpression = "vz"\n'
+        '[[events]]\nname = "rising"\nexpression = "z - h"\ndirection = "up"\n'
+        '[[events]]\nname = "turned"\nexpression = "qz - sin(3*t/2) + t - 1"',
+    )
     data = run_text(text).dataset
     # z = 10 t - 5 t^2
     assert data["top_time"].values == pytest.approx([1.0], abs=1e-14)

@@ -5,30 +5,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import run_text, same_bits
+from support import config, run_text, same_bits
 
 import rigidsim
 from rigidsim.solve import lyapunov
 
 BODY = ["wx", "wy", "wz", "qw", "qx", "qy", "qz"]
-SATELLITE = """
-name = "satellite"
-[body]
-principal_moments = [0.59555, 0.85945, 1]
-[initial]
-angular_velocity = {rates}
-euler_angles = [{angle}, 0, 0]
-[[loads]]
-kind = "gravity_gradient"
-gravitational_parameter = {strength}
-orbit = {{semi_major_axis = 1, eccentricity = 0.1}}
-[time]
-end = {end}
-samples = 501
-[output]
-lyapunov = true
-record = ["angular_velocity", "quaternion"]
-"""
+SATELLITE = config(
+    "principal_moments = [0.59555, 0.85945, 1]",
+    "angular_velocity = {rates}\neuler_angles = [{angle}, 0, 0]",
+    'kind = "gravity_gradient"\ngravitational_parameter = {strength}\n'
+    "orbit = {{semi_major_axis = 1, eccentricity = 0.1}}",
+    "end = {end}\nsamples = 501",
+    output='lyapunov = true\nrecord = ["angular_velocity", "quaternion"]',
+)
+FREE = config("principal_moments = [1, 2, 3]", "angular_velocity = [0.5, 0.25, 1]", output="lyapunov = true")
 
 
 def chaotic(out: Path, unit: float = 1.0, end: float = 4000.0) -> rigidsim.Run:
@@ -53,20 +44,7 @@ def test_convergence_is_in_the_dataset(runs: Path) -> None:
 
 
 def test_a_free_body_is_regular() -> None:
-    text = """
-    name = "free"
-    [body]
-    principal_moments = [1, 2, 3]
-    [initial]
-    angular_velocity = [0.5, 0.25, 1]
-    [time]
-    end = 2000
-    samples = 11
-    [output]
-    lyapunov = true
-    record = ["quaternion"]
-    """
-    run = run_text(text)
+    run = run_text(FREE, "time.end=2000", "time.samples=11", 'output.record=["quaternion"]')
     chaos = run.summary["lyapunov"]
     assert not chaos["chaotic"]
     assert chaos["predictable_seconds"] is None
@@ -80,19 +58,7 @@ def test_a_spectrum_that_was_interrupted_goes_on_with_the_same_bits(
 ) -> None:
     from rigidsim.session import lyapunov as spectra
 
-    text = """
-name = "free"
-[body]
-principal_moments = [1, 2, 3]
-[initial]
-angular_velocity = [0.5, 0.25, 1]
-[time]
-end = 300
-samples = 11
-[output]
-lyapunov = true
-timeline = false
-"""
+    text = FREE.replace("end = 3\n", "end = 300\n")
     whole = run_text(text, 'name="whole"', out=runs)
     seen = []
 

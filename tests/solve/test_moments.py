@@ -7,23 +7,16 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
-from support import EPSILON, cases, run_estimated, run_text, wide
+from support import EPSILON, cases, config, run_estimated, run_text, wide
 
 FAULTS = Path(__file__).parents[1] / "data" / "faults"
-LATE = """name = "late"
-[body]
-principal_moments = [1, 1, 1]
-[initial]
-angular_velocity = [0, 0, {spin}]
-[[loads]]
-kind = "torque"
-components = [0, 0, "{torque}"]
-[time]
-end = {end}
-samples = 3
-[integrator]
-precision = "{precision}"
-"""
+LATE = config(
+    "principal_moments = [1, 1, 1]",
+    "angular_velocity = [0, 0, 0]",
+    'kind = "torque"\ncomponents = [0, 0, "{torque}"]',
+    "end = 1000\nsamples = 3",
+    'precision = "{precision}"',
+)
 
 
 def turned(run: object) -> float:
@@ -67,7 +60,7 @@ def test_narrow_beside_the_last_digit_of_the_time(case: tuple[str, str]) -> None
     widths = {"single": ("2^-18", "2^-8"), "double": ("2^-47", "2^-30"), "extended": ("2^-50", "2^-36")}
     width = widths[precision][kind == "spike"]
     torque = "pulse(t, 700.3, 700.3 + {w})/{w}" if kind == "pulse" else "exp(-((t - 700.3)/{w})^2)/{w}"
-    text = LATE.format(spin=0, torque=torque.format(w=f"({width})"), end=1000, precision=precision)
+    text = LATE.format(torque=torque.format(w=f"({width})"), precision=precision)
     gained = wide(run_text(text).dataset, "angular_velocity")[-1, 2]
     exact = 1 if kind == "pulse" else np.longdouble("1.7724538509055160273")  # sqrt(pi)
     # some fifty steps through the spike, each of which rounds the rate twice
@@ -97,7 +90,7 @@ def impulse(shape: str, spacings: float, precision: str) -> float:
     """
     torque, exact = NARROW[shape]
     width = repr(spacings * 512 * EPSILON[precision])
-    text = LATE.format(spin=0, torque=f"({torque})/{{w}}".format(w=width), end=1000, precision=precision)
+    text = LATE.format(torque=f"({torque})/{{w}}".format(w=width), precision=precision)
     run = run_text(text)
     assert run.summary["status"] == "finished"
     return float(abs(wide(run.dataset, "angular_velocity")[-1, 2] - exact)) / EPSILON[precision] / exact
@@ -113,14 +106,14 @@ def test_nested_kinks_are_met_however_narrow(shape: str) -> None:
 
 def test_pulses_beyond_two_numbers_are_refused_with_the_reason() -> None:
     torque = "pulse(t, 700.3, 700.3 + 1e-40)*1e40"
-    summary = run_text(LATE.format(spin=0, torque=torque, end=1000, precision="double")).summary
+    summary = run_text(LATE.format(torque=torque, precision="double")).summary
     assert summary["status"] == "stopped: switching unresolved"
     assert "two numbers of double precision don't tell its impulse" in summary["message"]
 
 
 @pytest.mark.parametrize("torque", ["exp(-((t - 700.3)/(2^-48))^2)/(2^-48)", "1/cosh(t - 700.3)^2"])
 def test_spikes_that_stop_a_run_are_told_with_what_to_do(torque: str) -> None:
-    summary = run_text(LATE.format(spin=0, torque=torque, end=1000, precision="double")).summary
+    summary = run_text(LATE.format(torque=torque, precision="double")).summary
     assert summary["status"] == "stopped: non-finite state"
     for words in ("double precision resolves times", "choose a higher precision"):
         assert words in summary["message"]

@@ -230,25 +230,13 @@ def test_a_norm_that_vanishes_is_not_passed_over() -> None:
 
 def test_events_are_kept_where_steps_are_taken_back() -> None:
     """A pulse's edges, a torque that turns at wy = 0, and an event between: scipy's motion has them, too."""
-    text = """
-    name = "between"
-    [body]
-    principal_moments = [1, 2, 2.5]
-    [initial]
-    angular_velocity = [0.1, 0.2, 1]
-    [[loads]]
-    kind = "torque"
-    components = ["0.1*pulse(t, 1, 2)", "-0.01*abs(wy)", "max(0, sin(3*t))*0.1"]
-    [[states]]
-    name = "s"
-    derivative = "wz - s"
-    [[events]]
-    name = "half"
-    expression = "s - 0.5"
-    [time]
-    end = 3
-    samples = 4
-    """
+    text = config(
+        initial="angular_velocity = [0.1, 0.2, 1]",
+        loads='kind = "torque"\ncomponents = ["0.1*pulse(t, 1, 2)", "-0.01*abs(wy)", "max(0, sin(3*t))*0.1"]',
+        time="end = 3\nsamples = 4",
+        more='[[states]]\nname = "s"\nderivative = "wz - s"\n'
+        '[[events]]\nname = "half"\nexpression = "s - 0.5"',
+    )
     run = rigidsim.run(rigidsim.parse(text), out=None)
     moments = np.array([1, 2, 2.5])
 
