@@ -9,25 +9,17 @@ import erfa
 import numpy as np
 import pytest
 from sgp4.api import Satrec
-from support import run_text, seeds
+from support import config, run_text, seeds
 
 import rigidsim
 from rigidsim.scene.epochs import parse_epoch
 from rigidsim.scene.two_line_elements import checksum
 
-SCENE = """
-name = "dated"
-[body]
-principal_moments = [10, 14, 19]
-mass = 100
-[initial]
-angular_velocity = [0, 0, 0.001]
-{start}
-[time]
-end = 1
-samples = 2
-{epoch}
-"""
+SCENE = config(
+    "principal_moments = [10, 14, 19]\nmass = 100",
+    "angular_velocity = [0, 0, 0.001]\n{start}",
+    time="end = 1\nsamples = 2\n{epoch}",
+)
 LINES = (
     "1 00005U 58002B   69179.78495062  .00000023  00000-0  28098-4 0  4758",
     "2 00005  34.2682 348.7242 1859667 331.7664  19.3264 10.82419157413667",

@@ -4,24 +4,11 @@ import random
 
 import mpmath
 import pytest
-from support import parts_in, seeds
+from support import config, parts_in, seeds
 
 import rigidsim
 from rigidsim.errors import ConfigError
 
-SCENE = """
-name = "extreme"
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [0.1, 0.2, 1]
-[time]
-end = 1
-samples = 2
-[output]
-estimate = false
-timeline = false
-"""
 FORCE = '[[loads]]\nkind = "force"\npoint = [0, 0, 1]\ncomponents = ["{}", 0, 0]'
 DIPOLE = '[[loads]]\nkind = "magnetic_dipole"\nfield = [1, 0, 0]\nmoment = ["{}", 1, 0]'
 PLACES = {  # an expression's place in the config, and tables with it
@@ -55,7 +42,8 @@ RANGE = {
 
 def scene(precision: str | int, more: str) -> str:
     word = f'"{precision}"' if isinstance(precision, str) else precision
-    return f"{SCENE}[integrator]\nprecision = {word}\n{more}"
+    integrator, time = f"precision = {word}", "end = 1\nsamples = 2"
+    return config(initial="angular_velocity = [0.1, 0.2, 1]", time=time, integrator=integrator, more=more)
 
 
 @pytest.mark.parametrize("seed", seeds(1, 60))

@@ -5,6 +5,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from support import config
 
 from rigidsim import ConfigError, parse
 from rigidsim.scene.arithmetic import context_for
@@ -93,29 +94,16 @@ def test_what_does_not_fit_is_refused(text: str, unit: str | None, message: str)
     assert message in refused(text, unit)
 
 
-def config(parameters: str, component: str, event: str) -> str:
-    return f"""
-name = "units"
-[parameters]
-{parameters}
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [0, 0, 1]
-[[loads]]
-kind = "torque"
-components = ["0", "0", "{component}"]
-[[events]]
-name = "turned"
-expression = "{event}"
-[time]
-end = 1
-"""
+def scene(parameters: str, component: str, event: str) -> str:
+    return config(
+        loads=f'kind = "torque"\ncomponents = ["0", "0", "{component}"]',
+        more=f'[parameters]\n{parameters}\n[[events]]\nname = "turned"\nexpression = "{event}"',
+    )
 
 
 def test_a_config_with_units_is_the_one_without() -> None:
-    one = build_scene(parse(config('c = "200 mN m s"', "-c*wz", "phi - 90 deg")))
-    other = build_scene(parse(config("c = 0.2", "-c*wz", "phi - pi/2")))
+    one = build_scene(parse(scene('c = "200 mN m s"', "-c*wz", "phi - 90 deg")))
+    other = build_scene(parse(scene("c = 0.2", "-c*wz", "phi - pi/2")))
     values = {name: CONTEXT.mpf(n + 1) / 7 for n, name in enumerate(BODY_NAMES)}
     for first, second in (
         (one.loads[0].components[2], other.loads[0].components[2]),  # type: ignore[attr-defined]
@@ -124,9 +112,9 @@ def test_a_config_with_units_is_the_one_without() -> None:
         assert first == second
         assert evaluate(first, values, CONTEXT) == evaluate(second, values, CONTEXT)
     with pytest.raises(ConfigError, match=re.escape('where "N m" is needed')):
-        build_scene(parse(config('c = "0.2 N m"', "-c*wz", "phi - 1")))
+        build_scene(parse(scene('c = "0.2 N m"', "-c*wz", "phi - 1")))
     with pytest.raises(ConfigError, match=r'\[parameters\] c: given "0.2 Nm": unknown unit "Nm"'):
-        parse(config('c = "0.2 Nm"', "-c*wz", "phi - 1"))
+        parse(scene('c = "0.2 Nm"', "-c*wz", "phi - 1"))
 
 
 # ---- the documentation -----------------------------------------------------------------------------------

@@ -4,25 +4,19 @@ from pathlib import Path
 
 import mpmath
 import pytest
+from support import config
 
 from rigidsim import ConfigError, load, parse
 from rigidsim.scene.scene import build_scene
 
 HEADER = "time [day], semi_major_axis [au], eccentricity, mean_anomaly [deg]"
-CONFIG = """
-name = "planet"
-[body]
-principal_moments = [1, 1.01, 1.02]
-[initial]
-angular_velocity = [0, 0, "1 deg/s"]
-[[loads]]
-kind = "gravity_gradient"
-gravitational_parameter = "1.32712440018e20 m^3/s^2"
-orbit = {table = "elements.csv"%s}
-[time]
-end = "60 day"
-samples = 3
-"""
+CONFIG = config(
+    "principal_moments = [1, 1.01, 1.02]",
+    'angular_velocity = [0, 0, "1 deg/s"]',
+    'kind = "gravity_gradient"\ngravitational_parameter = "1.32712440018e20 m^3/s^2"\n'
+    'orbit = {table = "elements.csv"%s}',
+    'end = "60 day"\nsamples = 3',
+)
 
 
 def rows(count: int = 9, every: float = 10.0, header: str = HEADER, shift: float = 0.0) -> str:

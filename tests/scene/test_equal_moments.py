@@ -5,6 +5,7 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
+from support import config
 
 import rigidsim
 from rigidsim import ConfigError
@@ -14,20 +15,9 @@ FAULTS = Path(__file__).parents[1] / "data" / "faults"
 
 
 def scene(body: str, more: str = "", precision: str = '"double"') -> Scene:
-    return build_scene(
-        rigidsim.parse(f"""
-name = "equal_moments"
-[body]
-{body}
-[initial]
-angular_velocity = [0.3, 0.2, 1]
-[time]
-end = 1
-[integrator]
-precision = {precision}
-{more}
-""")
-    )
+    integrator = f"precision = {precision}"
+    text = config(body, "angular_velocity = [0.3, 0.2, 1]", (), "end = 1", integrator, more=more)
+    return build_scene(rigidsim.parse(text))
 
 
 def turned(moments: list[float], random: np.random.Generator) -> tuple[str, np.ndarray]:

@@ -7,6 +7,7 @@ import mpmath
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support import config
 
 from rigidsim import parse
 from rigidsim.scene.arithmetic import context_for, working_bits
@@ -36,17 +37,8 @@ def as_fraction(value: mpmath.mpf) -> Fraction:
 
 
 def scene_text(end: str = "1", rate: str = "1", moment: str = "2", integrator: str = "") -> str:
-    return f"""
-name = "exact"
-[body]
-principal_moments = [2, {moment}, 3]
-[initial]
-angular_velocity = [{rate}, 0, 1]
-[time]
-end = {end}
-[integrator]
-{integrator}
-"""
+    body, initial = f"principal_moments = [2, {moment}, 3]", f"angular_velocity = [{rate}, 0, 1]"
+    return config(body, initial, (), f"end = {end}", integrator)
 
 
 # ---- as written -------------------------------------------------------------------------------------------

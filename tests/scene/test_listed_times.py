@@ -4,20 +4,12 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from support import config
 
 import rigidsim
 from rigidsim.scene.scene import build_scene
 
-CONFIG = """
-name = "listed"
-[body]
-principal_moments = [1, 2, 3]
-[initial]
-angular_velocity = [0.1, 0.2, 0.3]
-[time]
-times = "theirs.csv"
-epoch = "2024-03-01T00:00:00 UTC"
-"""
+CONFIG = config(time='times = "theirs.csv"\nepoch = "2024-03-01T00:00:00 UTC"')
 
 
 def read(folder: Path, table: str) -> rigidsim.Experiment:

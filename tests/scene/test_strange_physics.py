@@ -11,6 +11,7 @@ import de421
 import numpy as np
 import pytest
 from kernel_scenes import moon, satellite, system
+from support import config
 from test_field_files import text as field_scene
 
 from rigidsim import ConfigError, load, parse
@@ -18,32 +19,20 @@ from rigidsim.scene.scene import build_scene
 from rigidsim.session.understood import cautions_of
 from rigidsim.solve.problem import prepare
 
-ORBIT = """
-name = "orbit"
-[body]
-principal_moments = [8.79e34, 8.7920e34, 8.7955e34]
-MORE
-[initial]
-angular_velocity = [1e-8, -2e-8, 2.6617e-6]
-[[loads]]
-kind = "gravity_gradient"
-gravitational_parameter = "3.986004418e14 m^3/s^2"
-orbit = {semi_major_axis = "384400 km"}
-LOAD
-[time]
-epoch = "2000-01-01T12:00:00 TDB"
-end = "10 day"
-samples = 3
-[frame]
-axes = "ICRF"
-"""
 FIGURE = 'figure = {J2 = %s, radius = "%s", pole = %s}'
 LOAD = '[[loads]]\nkind = "gravity_gradient"\nsource = "earth"\n'
 LONG = "a" * 5000
 
 
 def orbit(body: str = "", load: str = "") -> str:
-    return ORBIT.replace("MORE", body).replace("LOAD", load)
+    return config(
+        f"principal_moments = [8.79e34, 8.7920e34, 8.7955e34]\n{body}",
+        "angular_velocity = [1e-8, -2e-8, 2.6617e-6]",
+        'kind = "gravity_gradient"\ngravitational_parameter = "3.986004418e14 m^3/s^2"\n'
+        f'orbit = {{semi_major_axis = "384400 km"}}\n{load}',
+        'epoch = "2000-01-01T12:00:00 TDB"\nend = "10 day"\nsamples = 3',
+        more='[frame]\naxes = "ICRF"',
+    )
 
 
 def lumps(coefficients: str, radius: str = "1.7e6") -> str:

@@ -1,25 +1,18 @@
 """Angles that were probably meant in degrees are pointed out, and nothing else is."""
 
 import pytest
+from support import config
 
 from rigidsim import parse
 from rigidsim.scene.scene import build_scene
 from rigidsim.session.understood import cautions_of
 
-CONFIG = """
-name = "suspicious"
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [40, 60, 1000]
-euler_angles = {angles}
-[[loads]]
-kind = "gravity_gradient"
-gravitational_parameter = 4e14
-orbit = {{semi_major_axis = 7e6, inclination = {inclination}, mean_anomaly = {anomaly}}}
-[time]
-end = 1
-"""
+CONFIG = config(
+    initial="angular_velocity = [40, 60, 1000]\neuler_angles = {angles}",
+    loads='kind = "gravity_gradient"\ngravitational_parameter = 4e14\n'
+    "orbit = {{semi_major_axis = 7e6, inclination = {inclination}, mean_anomaly = {anomaly}}}",
+    time="end = 1",
+)
 
 
 def found(angles: str = "[0, 1, 0]", inclination: str = "1", anomaly: str = "0") -> list[str]:

@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from support import angle_between, cases, law, run_text, wide
+from support import angle_between, cases, config, law, run_text, wide
 
 from rigidsim.scene.fields import EULER_SEQUENCES
 from rigidsim.scene.rotations import AXES
@@ -16,20 +16,14 @@ RECORD = 'output.record=["angular_velocity", "quaternion", "euler_angles"]'
 EULER = 'integrator.formulation="euler_angles"'
 
 
-def tumbling(sequence: str, start: str = "quaternion = [0.7, 0.4, 0.5, 0.3]", time: str = "") -> str:
+def tumbling(
+    sequence: str,
+    start: str = "quaternion = [0.7, 0.4, 0.5, 0.3]",
+    time: str = "end = 100\nsamples = 1001",
+) -> str:
     """A body that turns over about its middle axis, through all attitudes."""
-    return f"""
-name = "free"
-[body]
-principal_moments = [1, 2, 3]
-[initial]
-angular_velocity = [0.3, 1.0, 0.5]
-{start}
-[time]
-{time or "end = 100" + chr(10) + "samples = 1001"}
-[integrator]
-euler_sequence = "{sequence}"
-"""
+    start = f"angular_velocity = [0.3, 1.0, 0.5]\n{start}"
+    return config("principal_moments = [1, 2, 3]", start, (), time, f'euler_sequence = "{sequence}"')
 
 
 def attitude_from(sequence: str, angles: np.ndarray) -> np.ndarray:
@@ -84,19 +78,9 @@ def test_a_pass_that_no_sampling_shows_goes_straight_through(case: tuple[str, st
     """A body that spins about the line of nodes: the middle angle grows like t through 16 singularities."""
     sequence, offset = case
     rates = [float(axis == sequence[1]) for axis in AXES]
-    text = f"""
-name = "straight"
-[body]
-principal_moments = [1, 1, 1]
-[initial]
-angular_velocity = {rates}
-euler_angles = [0.4, 0.75, "{offset}"]
-[time]
-end = 50
-samples = 5001
-[integrator]
-euler_sequence = "{sequence}"
-"""
+    start = f'angular_velocity = {rates}\neuler_angles = [0.4, 0.75, "{offset}"]'
+    integrator = f'euler_sequence = "{sequence}"'
+    text = config("principal_moments = [1, 1, 1]", start, (), "end = 50\nsamples = 5001", integrator)
     run = run_text(text, EULER, RECORD)
     angles = run.dataset["euler_angles"].values
     times = run.dataset["time"].values

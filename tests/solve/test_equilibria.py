@@ -107,19 +107,10 @@ def _frame(q: np.ndarray) -> np.ndarray:
 
 def test_rotors_of_both_kinds_lean_it_where_independent_torques_balance() -> None:
     """(I w + sum of J s a) x w = 3 n^2 (I c) x c at the start, by numpy; and the body rests for a day."""
-    rotors = """
-[[rotors]]
-name = "kept"
-axis = [1, 0.2, 0.1]
-moment = 0.1
-rate = 0.3
-fixed = true
-[[rotors]]
-name = "free"
-axis = [0, 0.2, 1]
-moment = 0.1
-rate = 0.5
-"""
+    rotors = (
+        '\n[[rotors]]\nname = "kept"\naxis = [1, 0.2, 0.1]\nmoment = 0.1\nrate = 0.3\nfixed = true\n'
+        '[[rotors]]\nname = "free"\naxis = [0, 0.2, 1]\nmoment = 0.1\nrate = 0.5\n'
+    )
     run = run_text(
         config(SATELLITE, more=rotors, end="86400", samples="5").replace('["quat', '["nadir", "quat')
     )

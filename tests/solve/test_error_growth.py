@@ -2,18 +2,12 @@
 
 import math
 
+from support import config
 from support import run_estimated as run_text
 
-SPIN = """
-name = "spin"
-[body]
-principal_moments = [1, 2, 3]
-[initial]
-angular_velocity = {rates}
-[time]
-end = {end}
-samples = 101
-"""
+SPIN = config(
+    "principal_moments = [1, 2, 3]", "angular_velocity = {rates}", time="end = {end}\nsamples = 101"
+)
 
 
 def test_spin_about_the_middle_axis_amplifies_by_no_more_than_the_inverse_square_of_its_offset() -> None:

@@ -106,19 +106,6 @@ def test_nothing_to_hold_is_refused() -> None:
     assert [name for name, row in rows.items() if row["put_back"] is not None] == ["quaternion_norm"]
 
 
-LOOSE = """
-name = "loose"
-[body]
-principal_moments = [1, 2, 3]
-[initial]
-angular_velocity = [0.5, 0.25, 1]
-[time]
-{time}
-[integrator]
-{integrator}
-"""
-
-
 def put_back_of(dataset: xarray.Dataset) -> dict[str, np.ndarray]:
     return {str(n): dataset[n].values for n in dataset.data_vars if str(n).endswith("_put_back")}
 
@@ -128,9 +115,13 @@ def put_back_of(dataset: xarray.Dataset) -> dict[str, np.ndarray]:
 def test_what_was_put_back_along_time_is_what_the_drift_would_have_been(formulation: str) -> None:
     """At a tolerance whose truncation errors stand far above rounding, and bias the invariants."""
     tolerance, end = 1e-6, 3000
-    integrator = f'tolerance = {tolerance}\nformulation = "{formulation}"\n'
-    text = LOOSE.format(time=f"end = {end}\nsamples = 31", integrator=integrator)
-    text = text.replace("[integrator]", '[output]\nrecord = ["angular_velocity"]\n[integrator]')
+    text = config(
+        "principal_moments = [1, 2, 3]",
+        "angular_velocity = [0.5, 0.25, 1]",
+        time=f"end = {end}\nsamples = 31",
+        integrator=f'tolerance = {tolerance}\nformulation = "{formulation}"',
+        output='record = ["angular_velocity"]',
+    )
     plain = run_text(text, "integrator.hold_invariants=false")
     held = run_text(text, "integrator.hold_invariants=true", 'name="held"')
     with plain.dataset as free, held.dataset as kept:

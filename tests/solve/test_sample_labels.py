@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 import xarray
-from support import cases, run_text
+from support import cases, config, run_text
 
 import rigidsim
 from rigidsim.scene.parts_of_values import parts_in
@@ -106,16 +106,7 @@ def test_the_motion_begins_at_start_and_not_at_the_first_sample(integrator: str)
 
 # ---- digits: what a precision promises is what the dataset holds
 
-TOP = """
-name = "top"
-[body]
-principal_moments = [2, 2, 3]
-[initial]
-angular_velocity = [0.1, 0, 0.7]
-[time]
-end = 20
-samples = 5
-"""
+TOP = config("principal_moments = [2, 2, 3]", "angular_velocity = [0.1, 0, 0.7]", (), "end = 20\nsamples = 5")
 
 
 def exact_rates(digits: int, times: list) -> list[list]:

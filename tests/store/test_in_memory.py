@@ -12,24 +12,11 @@ import rigidsim
 OF_ONE_RUN = ("run_id", "started_at", "finished_at", "wall_seconds", "cpu_seconds")
 PRECISIONS = ("single", "double", "extended", "quadruple")
 USUAL = [path for path in CONFIGS if path.stem in ("moon_mean_axis", "skater")]  # dates, and "work"
-EXTRAS = """
-[[events]]
-name = "found"
-expression = "wx"
-[[events]]
-name = "never"
-expression = "1 + t"
-[[rotors]]
-name = "a"
-axis = [1, 0, 0]
-moment = 0.1
-rate = 3
-[[rotors]]
-name = "longer"
-axis = [0, 1, 0]
-moment = 0.2
-rate = 2
-"""
+EXTRAS = (
+    '[[events]]\nname = "found"\nexpression = "wx"\n[[events]]\nname = "never"\nexpression = "1 + t"\n'
+    '[[rotors]]\nname = "a"\naxis = [1, 0, 0]\nmoment = 0.1\nrate = 3\n'
+    '[[rotors]]\nname = "longer"\naxis = [0, 1, 0]\nmoment = 0.2\nrate = 2\n'
+)
 STOP = '[[events]]\nname = "soon"\nexpression = "t - 0.5"\naction = "stop"'
 
 

@@ -111,28 +111,16 @@ def test_the_accuracy_of_axes_chooses_the_model() -> None:
         run_text(given)
 
 
-EARTH = """name = "earth"
-[body]
-preset = "earth"
-[initial]
-angular_velocity = [0, 0, "7.292115e-5 rad/s"]
-euler_angles = ["180 deg", "84381.406 arcsec", 0]
-[[loads]]
-kind = "gravity_gradient"
-gravitational_parameter = "1.32712440018e20"
-orbit = {semi_major_axis = "1.495978707e11", eccentricity = 0.016709}
-[time]
-end = "100000 yr"
-samples = 101
-[model]
-level = "auto"
-short_period = true
-[integrator]
-accuracy_axis = 1e-5
-[output]
-record = ["figure_axis", "momentum_axis"]
-timeline = false
-"""
+EARTH = config(
+    'preset = "earth"',
+    'angular_velocity = [0, 0, "7.292115e-5 rad/s"]\neuler_angles = ["180 deg", "84381.406 arcsec", 0]',
+    'kind = "gravity_gradient"\ngravitational_parameter = "1.32712440018e20"\n'
+    'orbit = {semi_major_axis = "1.495978707e11", eccentricity = 0.016709}',
+    'end = "100000 yr"\nsamples = 101',
+    "accuracy_axis = 1e-5",
+    'record = ["figure_axis", "momentum_axis"]',
+    '[model]\nlevel = "auto"\nshort_period = true',
+)
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
+from support import config
 
 import rigidsim
 from experiments import compare_conventions
@@ -28,19 +29,9 @@ def experiment() -> rigidsim.Experiment:
 
 
 def made() -> rigidsim.Experiment:
-    return rigidsim.parse(
-        f"""
-        name = "free"
-        [body]
-        principal_moments = {MOMENTS.tolist()}
-        [initial]
-        angular_velocity = {START.tolist()}
-        quaternion = {QUATERNION.tolist()}
-        [time]
-        end = {END}
-        samples = 3
-        """
-    )
+    start = f"angular_velocity = {START.tolist()}\nquaternion = {QUATERNION.tolist()}"
+    time = f"end = {END}\nsamples = 3"
+    return rigidsim.parse(config(f"principal_moments = {MOMENTS.tolist()}", start, time=time, name="free"))
 
 
 def slopes(_: float, y: np.ndarray, moments: np.ndarray = MOMENTS) -> np.ndarray:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from support import config
 
 import rigidsim
 from rigidsim.errors import ConfigError
@@ -19,20 +20,13 @@ EPOCH = "2029-04-13T21:46:00 TDB"
 AHEAD = parse_epoch(EPOCH).since_j2000()
 TICK = 2.0**-10  # s
 ATTITUDE, RATE = 1e-3, 1e-4  # sigmas, rad and rad/s
-TUMBLING = f"""
-name = "tumbling"
-[body]
-principal_moments = [1, 1.6, 2.2]
-[initial]
-angular_velocity = [0.02, 0.1, 0.05]
-quaternion = [0.5, 0.1, -0.7, 0.4]
-[frame]
-axes = "ecliptic J2000"
-[time]
-epoch = "{EPOCH}"
-end = 100
-samples = 51
-"""
+TUMBLING = config(
+    "principal_moments = [1, 1.6, 2.2]",
+    "angular_velocity = [0.02, 0.1, 0.05]\nquaternion = [0.5, 0.1, -0.7, 0.4]",
+    time=f'epoch = "{EPOCH}"\nend = 100\nsamples = 51',
+    more='[frame]\naxes = "ecliptic J2000"',
+    name="tumbling",
+)
 FIT = """
 [fit]
 parameters = ["initial.attitude", "initial.angular_velocity", "body.principal_moments[1]"]
@@ -163,7 +157,7 @@ def test_a_fit_to_a_kernel_finds_start_and_moment(here: Path) -> None:
 
 def test_a_message_is_turned_from_its_own_axes(here: Path) -> None:
     """An AEM of a scene in the ecliptic is about the equator; another tool's may go from body to space."""
-    rigidsim.run(rigidsim.parse(TUMBLING + "[output]\ntimeline = false\n"), out=here / "runs")
+    rigidsim.run(rigidsim.parse(TUMBLING), out=here / "runs")
     [path] = rigidsim.export(here / "runs/tumbling", "aem", here / "seen.aem")
     text = path.read_text()
     assert "REF_FRAME_A = EME2000" in text
@@ -176,10 +170,10 @@ def test_a_message_is_turned_from_its_own_axes(here: Path) -> None:
     text = "\n".join(rows).replace("REF_FRAME_A = EME2000", "REF_FRAME_A = SC_BODY_1")
     text = text.replace("REF_FRAME_B = SC_BODY_1", "REF_FRAME_B = EME2000")
     path.write_text(text)
-    config = TUMBLING + FIT.replace("seen.bc", "seen.aem").replace('kernels = ["clock.tsc"]', "")
-    found = rigidsim.fit(rigidsim.parse(config))
+    fit = TUMBLING + FIT.replace("seen.bc", "seen.aem").replace('kernels = ["clock.tsc"]', "")
+    found = rigidsim.fit(rigidsim.parse(fit))
     assert found.data[0].rms < 1e-9
     assert abs(found.value("initial.attitude[0]")) < 1e-9
     path.write_text(text.replace("EME2000", "MARS_IAU"))
     with pytest.raises(ConfigError, match="attitudes and orbits about one of EME2000"):
-        rigidsim.fit(rigidsim.parse(config))
+        rigidsim.fit(rigidsim.parse(fit))

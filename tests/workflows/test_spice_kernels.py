@@ -10,26 +10,19 @@ import numpy as np
 import pytest
 import spiceypy
 from scipy.spatial.transform import Rotation
-from support import run_text
+from support import config, run_text
 
 import rigidsim
 from rigidsim.formats.registry import Naming
 from rigidsim.workflows.export import export
 
-SATELLITE = """
-name = "sat"
-[body]
-principal_moments = [1, 1.5, 2.2]
-[initial]
-angular_velocity = [0.01, 0.03, 0.12]
-quaternion = [0.5, 0.1, -0.7, 0.4]
-[frame]
-axes = "ICRF"
-[time]
-epoch = "2029-04-13T21:46:00 TDB"
-end = 500
-samples = 11
-"""
+SATELLITE = config(
+    "principal_moments = [1, 1.5, 2.2]",
+    "angular_velocity = [0.01, 0.03, 0.12]\nquaternion = [0.5, 0.1, -0.7, 0.4]",
+    time='epoch = "2029-04-13T21:46:00 TDB"\nend = 500\nsamples = 11',
+    more='[frame]\naxes = "ICRF"',
+    name="sat",
+)
 
 
 @contextmanager
@@ -63,7 +56,8 @@ def agrees(
 ) -> None:  # fmt: skip
     """SPICE's matrices and rates are the run's, sampled anew at random times that both know exactly."""
     numbers = np.random.default_rng(5)
-    first, last = (float(ahead + x) for x in _span(text, settings))
+    time = rigidsim.parse(text, overrides=settings).config.time
+    first, last = (float(ahead + x.rational) for x in (time.start, time.end))
     unit = max(np.spacing(abs(x)) for x in (first, last, last - first))
     steps = np.unique(numbers.integers(1, int((last - first) / unit), count))
     dates = [Fraction(first) + int(k) * Fraction(unit) for k in steps]
@@ -81,11 +75,6 @@ def agrees(
     assert (Rotation.from_matrix(np.array(plain)).inv() * body).magnitude().max() < bound
     size = np.linalg.norm(rate, axis=1).max()
     assert np.linalg.norm(np.array([w for _, w in parts]) - rate, axis=1).max() < max(bound, 1e-12) * size
-
-
-def _span(text: str, settings: tuple[str, ...]) -> tuple[Fraction, Fraction]:
-    config = rigidsim.parse(text, overrides=settings).config.time
-    return config.start.rational, config.end.rational
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support import config
 
 import rigidsim
 from rigidsim.errors import RigidsimError
@@ -16,16 +17,7 @@ from rigidsim.workflows.sweeps.sweep import resume_sweep
 from rigidsim.workflows.sweeps.verify import verify_sweep
 
 SIGMA = 0.01  # rad/s
-SPUN = """
-name = "nights"
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [0.3, 1.0, -0.4]
-[time]
-end = 10
-samples = 21
-"""
+SPUN = config(initial="angular_velocity = [0.3, 1.0, -0.4]", time="end = 10\nsamples = 21", name="nights")
 FIT = """
 [fit]
 parameters = ["initial.angular_velocity", "body.principal_moments[1]"]

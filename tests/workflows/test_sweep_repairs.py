@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support import config
 from typer.testing import CliRunner
 
 from rigidsim import ConfigError, RunFolderError, SavedSweep, parse
@@ -12,27 +13,16 @@ from rigidsim import sweep as run_sweep
 from rigidsim.cli.app import app
 from rigidsim.workflows.sweeps.sweep import SweepObserver
 
-CONFIG = """\
-name = "box"
-[body]
-principal_moments = [1, 2, 3]
-[initial]
-angular_velocity = [0.1, 1, 0.05]
-[time]
-end = 8
-samples = 3
-[integrator]
-formulation = "rates"
-[output]
-estimate = false
-record = ["angular_velocity"]
-[[events]]
-name = "flip"
-expression = "wy"
-[sweep]
-tile = 2
-axes."initial.angular_velocity[2]" = {step = [0.1, 0.1, 6], name = "w3"}
-"""
+CONFIG = config(
+    "principal_moments = [1, 2, 3]",
+    "angular_velocity = [0.1, 1, 0.05]",
+    time="end = 8\nsamples = 3",
+    integrator='formulation = "rates"',
+    output='record = ["angular_velocity"]',
+    more='[[events]]\nname = "flip"\nexpression = "wy"\n[sweep]\ntile = 2\n'
+    'axes."initial.angular_velocity[2]" = {step = [0.1, 0.1, 6], name = "w3"}',
+    name="box",
+)
 LONGER = CONFIG.replace("0.1, 6]", "0.1, 7]")
 
 
