@@ -91,6 +91,7 @@ def test_an_interrupted_run_keeps_what_it_has(
         assert assert_first_samples(partial, whole) > 1
 
 
+@pytest.mark.slow
 def test_ctrl_c_while_the_engine_is_compiled(config: Config, start: Start) -> None:
     """Which takes seconds, and here a minute: nobody waits for it."""
     prelude = (

@@ -59,7 +59,7 @@ def sphere_axes(colatitude: float, longitude: float) -> np.ndarray:
     return np.array([[s * k, s * f, c], [c * k, c * f, -s], [-f, k, 0]])
 
 
-@pytest.mark.parametrize("case", PPIGRF)
+@pytest.mark.parametrize("case", cases(PPIGRF, list(PPIGRF)[:2]))
 def test_it_is_that_of_another_program(case: tuple[float, float, float, str]) -> None:
     radius, colatitude, longitude, day = case
     axes = "ICRF" if radius < 7000 else "ecliptic J2000"

@@ -34,7 +34,7 @@ def test_without_delay_and_with_one_up_to_its_third_order(delay: float, within: 
     """To the other integrator's 1e-13 of each step, or to (2 tau)^3 / 6 of the distortion, whose frequency is
     2.
     """
-    run = run_text(scene(4, f"{ELASTIC}, delay = {delay}", samples=5))
+    run = run_text(scene(2, f"{ELASTIC}, delay = {delay}", samples=3))
     moments, begun = ([float(x) for x in given] for given in (MOMENTS, RATES))
     truth = Delayed(moments, STRENGTH, delay, begun[2], 1.0, 1.0, 0.1)
     rates, attitudes, distortions = truth.followed(begun, run.dataset["time"].values)

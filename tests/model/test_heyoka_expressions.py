@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 from equations import CLOSE, derivative, prepared
-from support import config, run_text
+from support import cases, config, run_text
 
 from rigidsim.scene.exact import parse_number
 from rigidsim.scene.expressions.names import BODY_NAMES
@@ -19,7 +19,10 @@ OTHERS = "2*wx^3 - wy/3", "(wx + 1e-3)^-2.5*pi", "-wx*wy*-wz/7.25^0.5"
 SMOOTH = sorted(set(FUNCTIONS) - {"atan2"})  # whose cut is a switching surface
 
 
-@pytest.mark.parametrize("names", [SMOOTH[n : n + 2] for n in range(0, len(SMOOTH), 2)], ids="-".join)
+PAIRS = [SMOOTH[n : n + 2] for n in range(0, len(SMOOTH), 2)]
+
+
+@pytest.mark.parametrize("names", cases(PAIRS, PAIRS[::3], daily=4), ids="-".join)
 def test_what_is_compiled_is_mpmaths_value_within_rounding(names: list[str]) -> None:
     """Of a sphere of unit inertia, whose rates change as the torque says."""
     texts = [f"{name}({', '.join(ARGUMENTS[: FUNCTIONS[name]])})" for name in names]

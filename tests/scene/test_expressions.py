@@ -95,7 +95,7 @@ rational = st.recursive(
 RATIONALS = {"t": Fraction(3, 4), "wx": Fraction(-5, 8), "wy": Fraction(7, 2)}
 
 
-@settings(max_examples=250)
+@settings(max_examples=80)
 @given(rational)
 def test_arithmetic_is_that_of_pythons_fractions(text: str) -> None:
     """Python reads the same text, written in the test itself, with its own precedence and exact fractions."""

@@ -168,6 +168,7 @@ def test_the_moons_state_is_the_observed_one_with_its_librations() -> None:
     assert np.degrees(np.arccos(pole[2])) == pytest.approx(1.543, rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_triaxial_planet_out_of_step_starts_by_its_mean_moments() -> None:
     """Mars' own moments, and the mean of both: one start."""
     orbit = 'semi_major_axis = "1.523679 au"\ninclination = "1.67 deg"\nnode_rate = "-17.6 arcsec/yr"'

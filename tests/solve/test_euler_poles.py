@@ -93,6 +93,7 @@ def crossings(start: str, expression: str, formulation: str) -> np.ndarray:
 SPIN, TUMBLE = "angular_velocity = [0, 0, 1]", "angular_velocity = [0.3, 0.2, 1]"
 
 
+@pytest.mark.slow
 def test_events_see_a_motion_leave_the_pole() -> None:
     """As one that reads the elements of R: phi is the angle of (R_xz, -R_yz)."""
     # the angle of a vector that vanishes at the start, so that this product does, too

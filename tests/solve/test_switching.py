@@ -118,18 +118,19 @@ def test_friction_about_three_axes_ends_in_rest() -> None:
     assert abs(states["work"] + energy) < 32 * EPSILON["double"] * energy
 
 
-@pytest.mark.parametrize(
-    ("torque", "rate"),
-    [
-        ("sign((t - 5)^2)", 10.0),  # touched, never crossed
-        ("step(t - 2.5)*min(t, 4)", (16 - 6.25) / 2 + 24),
-        ("abs(abs(t - 5) - 2)", 4 + 9.0),
-        ("sign(sign(t - 3) + 0.5)", 7 - 3.0),  # an argument that jumps itself
-        ("step(sin(t - 2)*(2.5 - t))", 0.5 + np.pi),  # on a surface again within the step after one
-        ("1 - 0.3*abs(wx)", 10.0),  # never left
-    ],
-)
-def test_each_side_integrates_by_itself(torque: str, rate: float) -> None:
+SIDES = [
+    ("sign((t - 5)^2)", 10.0),  # touched, never crossed
+    ("step(t - 2.5)*min(t, 4)", (16 - 6.25) / 2 + 24),
+    ("abs(abs(t - 5) - 2)", 4 + 9.0),
+    ("sign(sign(t - 3) + 0.5)", 7 - 3.0),  # an argument that jumps itself
+    ("step(sin(t - 2)*(2.5 - t))", 0.5 + np.pi),  # on a surface again within the step after one
+    ("1 - 0.3*abs(wx)", 10.0),  # never left
+]
+
+
+@pytest.mark.parametrize("case", cases(SIDES, SIDES[::2]))
+def test_each_side_integrates_by_itself(case: tuple[str, float]) -> None:
+    torque, rate = case
     progress, found = about_z(torque)
     assert progress.status is Status.FINISHED
     assert abs(float(found["wz"]) - rate) < 16 * EPSILON["double"] * rate

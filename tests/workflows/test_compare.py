@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
-from support import config
+from support import cases, config
 
 import rigidsim
 from experiments import compare_conventions
@@ -182,7 +182,7 @@ def write(path: Path, times: np.ndarray, q: np.ndarray, w: np.ndarray, form: str
     return path
 
 
-@pytest.mark.parametrize("suffix", ["csv", "parquet", "nc"])
+@pytest.mark.parametrize("suffix", cases(["csv", "parquet", "nc"], ["csv"]))
 def test_files(experiment: rigidsim.Experiment, tmp_path: Path, suffix: str) -> None:
     times, q, w = theirs(1e-12)
     path = tmp_path / f"theirs.{suffix}"
