@@ -327,7 +327,7 @@ def _with_bodies(scene: Scene, prepared: InitialValueProblem, states: Sequence[A
         positions=tuple([held[f"{name}_{x}"] for x in "xyz"] for name in scene.bodies.names),
         velocities=tuple([held[f"{name}_v{x}"] for x in "xyz"] for name in scene.bodies.names),
     )
-    return replace(scene, bodies=masses, loads=tuple(load.among(masses) for load in scene.loads))
+    return replace(scene, bodies=masses, loads=tuple(load.with_point_masses(masses) for load in scene.loads))
 
 
 def _followed(

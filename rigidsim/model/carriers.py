@@ -12,8 +12,8 @@ where g_k = -h_k' is the torque that a carrier exerts on the body, a motor's or 
 Attitude Dynamics, 1986, section 3.4). The body's tensor I is then that of what turns with it: of a rotor on a
 bearing it includes the mass, but not the moment about the bearing's axis.
 
-A carrier is a load: it brings its states by ``extra_states``, and is registered, configured and told in the
-same way. Motions and formulations that know the body alone ask ``carried_beside``.
+A carrier is a load: it brings its states by ``extra_states``, and is registered, configured and reported in
+the same way. Motions and formulations that know the body alone ask ``carried_beside``.
 """
 
 from __future__ import annotations

@@ -138,7 +138,7 @@ def sgp4(elements: TwoLineElements, epoch: Epoch) -> tuple[list[float], list[flo
             f'remove [time] epoch; given "{one}" and "{two}"'
         )
     satellite = api.Satrec.twoline2rv(one, two)
-    # on the way, too: of a satellite that has come down SGP4 tells once, and goes on
+    # on the way, too: SGP4 reports only once that a satellite has come down, and goes on
     for moment in np.linspace(0.0, minutes, math.ceil(abs(minutes) / _WATCHED) + 1)[::-1]:
         code, found, moving = satellite.sgp4_tsince(float(moment))
         if code:

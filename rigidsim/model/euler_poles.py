@@ -2,7 +2,7 @@
 
 With f the sine (proper sequences) or cosine (the others) of the middle angle, R contains sine and cosine of
 the outer angles a and c times f. Rounding errors e leave each of them uncertain by e / f, and where f
-vanishes neither is defined. What R tells to rounding there is the turn about the axis that both share,
+vanishes neither is defined. What R gives to rounding there is the turn about the axis that both share,
 
     a + s c,   s = sign(R_ii) for a proper sequence iji, sign(R_ik) for ijk.
 

@@ -82,13 +82,13 @@ class MassDistribution:
     would have with the same momentum.
 
     Attributes:
-        slip: what the angular velocity differs by from these, 1 / time; None where rates are the states.
-        distortion: what the tensor differs by from the constant one; known where something slips.
+        rate_correction: angular velocity less these rates, 1 / time; None where rates are the states.
+        distortion: what the tensor differs by from the constant one; known where the rates are corrected.
     """
 
     matrix: SymbolicMatrix
     change: SymbolicMatrix | None
-    slip: list[Symbolic] | None = None
+    rate_correction: list[Symbolic] | None = None
     distortion: SymbolicMatrix | None = None
 
 

@@ -59,7 +59,7 @@ class Kinematics:
 
     @cached_property
     def sides(self) -> Mapping[Expression, Symbolic]:
-        """For the sign of each surface's argument, the parameter that tells the side the motion is on."""
+        """For the sign of each surface's argument, the parameter that says on which side the motion is."""
         places = self.surfaces.places
         return {node: hy.par[index] if sign > 0 else -hy.par[index] for node, (index, sign) in places.items()}
 
@@ -69,35 +69,35 @@ class Kinematics:
         return in_common_unit(self.rate_states, self.numbers.rate_units, self.number)
 
     @cached_property
-    def bare_rates(self) -> list[Symbolic]:
+    def undistorted_rates(self) -> list[Symbolic]:
         """The same of a body of the constant tensor with the same angular momentum, where that is carried."""
-        if self.slip is None:
+        if self.rate_correction is None:
             return self.rates
         return in_common_unit(self.carried_rates, self.numbers.rate_units, self.number)
 
     @property
-    def slip(self) -> list[Symbolic] | None:
+    def rate_correction(self) -> list[Symbolic] | None:
         """See ``MassDistribution``."""
-        return None if self.shape is None else self.shape.slip
+        return None if self.shape is None else self.shape.rate_correction
 
     @property
     def carried_rates(self) -> list[Symbolic]:
         """The three states of the rates, each in its own unit."""
-        return list(hy.make_vars(*self.body.rates)) if self.slip is not None else self.rate_states
+        return list(hy.make_vars(*self.body.rates)) if self.rate_correction is not None else self.rate_states
 
     @cached_property
     def inertia(self) -> Inertia:
         """Tensor of what turns with the body, by which torques change the rates; the constant one where the
         momentum is carried.
         """
-        if self.shape is not None and self.shape.slip is None:
+        if self.shape is not None and self.shape.rate_correction is None:
             return VaryingInertia.of(self.shape, self.numbers, self.number)
         return ConstantInertia.of(self.numbers, self.number, self.scene.context)
 
     @cached_property
     def own_momentum(self) -> list[Symbolic]:
         """Angular momentum I w of the body itself, body axes."""
-        return self.inertia.times(self.bare_rates)
+        return self.inertia.times(self.undistorted_rates)
 
     @staticmethod
     def carried(part: T | None) -> T:
@@ -134,14 +134,14 @@ class Kinematics:
         return apply(transpose(self.matrix), space)
 
     @property
-    def marked(self) -> Vector | None:
+    def preferred_axis(self) -> Vector | None:
         """Body-axes vector that a uniform field pulls on (mpf); None without one."""
         return self.numbers.arm
 
     @cached_property
     def symmetry_direction(self) -> Vector | None:
         """Unit axis (mpf, body axes) of the tensor's symmetry; None without one, or where a sphere has none
-        marked by a load. Moments that vary are equal where their expressions are.
+        that a load prefers. Moments that vary are equal where their expressions are.
         """
         context, body = self.scene.context, self.scene.body
         moments, axes = body.principal_moments, body.principal_axes
@@ -153,10 +153,10 @@ class Kinematics:
             return bool(abs(moments[i] - moments[j]) <= tiny)
 
         if equal(0, 1) and equal(0, 2):  # a sphere
-            if self.marked is None:
+            if self.preferred_axis is None:
                 return None
-            length = context.sqrt(dot(self.marked, self.marked))
-            return [a / length for a in self.marked]
+            length = context.sqrt(dot(self.preferred_axis, self.preferred_axis))
+            return [a / length for a in self.preferred_axis]
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
             if equal(j, k):

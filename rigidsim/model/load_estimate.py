@@ -28,7 +28,7 @@ from rigidsim.model.load import Load, Term, force_terms, loads_of, torque_terms
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.names import written
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.scaling import Drive, choose_scaling, scaled_numbers
+from rigidsim.model.scaling import EstimatedEffect, choose_scaling, scaled_numbers
 from rigidsim.model.state_blocks import BODY, joined
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, transpose
@@ -67,7 +67,7 @@ Function = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 def estimate_drive(
     scene: Scene, loads: Sequence[Load], requirements: Requirements, surfaces: Surfaces
-) -> Drive | None:
+) -> EstimatedEffect | None:
     """Estimate of what these loads, whose size is unknown, can add to the motion; None without any.
 
     Raises:
@@ -234,7 +234,7 @@ class _Trial:
 
     # --- what the loads can add -----------------------------------------------------------------------------
 
-    def drive(self) -> Drive:
+    def drive(self) -> EstimatedEffect:
         """Estimated energy of rotation and speed that the loads add."""
         m, names, states = self.m, self.names, self._states()
         context, scaling = m.scene.context, m.scaling
@@ -252,7 +252,7 @@ class _Trial:
         if m.velocity is not None:
             power = power + (pushed * states[[names.index(x) for x in BODY.velocity], None]).sum(axis=0)
         if np.any(power != 0) and power.max() <= 0:  # damping only removes energy
-            return Drive(context.zero, context.zero)
+            return EstimatedEffect(context.zero, context.zero)
         inverse = np.array([[float(x) for x in row] for row in m.numbers.inverse_inertia])
         matrices = np.array([_matrix(q) for q in states[[names.index(x) for x in BODY.quaternion]].T])
         lasting = 0.0
@@ -272,7 +272,7 @@ class _Trial:
         room = 2.0 ** (scaling.length - scaling.speed - scaling.time)
         speed += min(_swing(times, pushed, pushed_change, peak), float(np.sqrt(2 * peak * room)))
         sizes = ((energy, scaling.energy), (speed, scaling.speed))
-        return Drive(*(context.ldexp(context.mpf(value), exponent) for value, exponent in sizes))
+        return EstimatedEffect(*(context.ldexp(context.mpf(value), exponent) for value, exponent in sizes))
 
     def _states(self) -> np.ndarray:
         """States like the start, (names, states)."""

@@ -54,9 +54,9 @@ class Mechanics(Kinematics):
         if not reshaping:
             return self
         made = replace(self, shape=reshaping[0].shape(self))
-        if made.slip is None:
+        if made.rate_correction is None:
             return made
-        states = zip(made.carried_rates, made.slip, self.numbers.rate_units, strict=True)
+        states = zip(made.carried_rates, made.rate_correction, self.numbers.rate_units, strict=True)
         turning = [w + (x if u == 1 else self.number(1 / u) * x) for w, x, u in states]
         return replace(made, rate_states=turning)
 
@@ -84,8 +84,8 @@ class Mechanics(Kinematics):
         """Sine and cosine, times a common size, of the angle that an averaged resonance keeps; else None."""
         return None
 
-    def tells(self, name: str) -> bool:
-        """Whether the motion carries enough to record this observable, as far as ``needs`` can't tell."""
+    def provides(self, name: str) -> bool:
+        """Whether the motion carries enough to record this observable, as far as ``needs`` doesn't decide."""
         return True
 
     @property
@@ -130,12 +130,12 @@ class Mechanics(Kinematics):
         return self._rotational([x for x in self.carriers if not x.lends(self)])
 
     def _rotational(self, carriers: list[Any]) -> Symbolic:
-        own = self.inertia.energy(self.bare_rates, self.own_momentum)
+        own = self.inertia.energy(self.undistorted_rates, self.own_momentum)
         others = [found for x in carriers if (found := x.carried_energy(self)) is not None]
         return hy.sum([own, *others]) if others else own
 
     @cached_property
-    def lent_energy(self) -> Symbolic | None:
+    def energy_stored_by_drives(self) -> Symbolic | None:
         """Energy of those carriers; None without any."""
         found = [x.carried_energy(self) for x in self.carriers if x.lends(self)]
         if found and self._rigid is not None and self.potential_energy is not None:
@@ -148,7 +148,7 @@ class Mechanics(Kinematics):
         the change brings counts as lent.
         """
         lending = any(x.lends(self) for x in self.carriers)
-        return replace(self, shape=None) if lending and self.slip is not None else None
+        return replace(self, shape=None) if lending and self.rate_correction is not None else None
 
     @cached_property
     def starting_momentum(self) -> Vector:
@@ -162,7 +162,7 @@ class Mechanics(Kinematics):
     @property
     def starting_rates(self) -> Vector:
         """What the states of the rates are at the start (mpf, rad/s)."""
-        if self.slip is None:
+        if self.rate_correction is None:
             return self.scene.angular_velocity
         momentum = multiply(self.scene.turning_inertia, self.scene.angular_velocity)
         for carrier in self.carriers:
@@ -202,8 +202,8 @@ class Mechanics(Kinematics):
     def accelerations(self) -> list[Symbolic]:
         """Derivatives of the states of the rates, each in its own unit."""
         torque = [*self.torque, *self.inner_torque]
-        if self.slip is not None:  # M x w is that of the states and this
-            turned = cross(self.own_momentum, self.slip)
+        if self.rate_correction is not None:  # M x w is that of the states and this
+            turned = cross(self.own_momentum, self.rate_correction)
             torque += zip(unit_vectors(self.scene.context), turned, strict=True)
         return self.inertia.accelerations(self.carried_rates, self.numbers.rate_units, torque)
 
@@ -264,7 +264,7 @@ class Mechanics(Kinematics):
     @property
     def drives_work(self) -> bool:
         """The same, drives that keep a rate included."""
-        return self.driven_within or self.lent_energy is not None
+        return self.driven_within or self.energy_stored_by_drives is not None
 
     @property
     def conserves_energy(self) -> bool:
@@ -297,7 +297,7 @@ class Mechanics(Kinematics):
         return hy.sum(terms)
 
     @property
-    def marked(self) -> Vector | None:
+    def preferred_axis(self) -> Vector | None:
         """To the centre of mass of a heavy body, or along the dipole of any other."""
         pulled = [load.linear_potential(self.scene) for load in self.loads]
         return self.numbers.arm or next((found[0] for found in pulled if found is not None), None)

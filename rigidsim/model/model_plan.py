@@ -182,13 +182,13 @@ def _each_once(loads: Sequence[Load]) -> list[str]:
     kinds: dict[str, list[Load]] = {}
     for load in loads:
         kinds.setdefault(load.title, []).append(load)
-    told = []
+    titles = []
     for title, alike in kinds.items():
-        # not what pictures tell: numbers that are looked at tell members of a sweep apart
+        # no numbers as in pictures: numbers that are read distinguish members of a sweep
         sources = [name for load in alike if (name := load.placement.name)]
         of_which = ", ".join(sources) if len(sources) == len(alike) else f"{len(alike)} loads"
-        told.append(f"{title} ({of_which})" if len(alike) > 1 else title)
-    return told
+        titles.append(f"{title} ({of_which})" if len(alike) > 1 else title)
+    return titles
 
 
 def _read_by(readers: list[str], them: str = "it") -> str:
@@ -202,8 +202,8 @@ def _names_that_take(scene: Scene, need: str) -> str:
         names = {readable.name for readable in readables(expression) if need in readable.states}
         if names:
             found.setdefault(expression.where.rsplit(" ", 1)[0], set()).update(names)
-    told = [f"{', '.join(sorted(names))} in {place}" for place, names in found.items()]
-    return f" ({'; '.join(told)})" if told else ""
+    places = [f"{', '.join(sorted(names))} in {place}" for place, names in found.items()]
+    return f" ({'; '.join(places)})" if places else ""
 
 
 def _flight(scene: Scene, record: list[str] | None, readers: list[str]) -> str | None:

@@ -36,7 +36,7 @@ _ALIKE = 8  # states like the start
 _LATEST = 8.0  # binary exponent of the units of time until which functions of time are looked at
 _SMALL = -20  # binary exponent of a small part, in difference quotients
 _NEWTON = 40  # iterations, each of which halves the distance to a double zero
-_TINY, _HUGE = -200, 200  # binary exponents of what tells nothing: a spike's flank, a pole
+_TINY, _HUGE = -200, 200  # binary exponents of values without meaning: a spike's flank, a pole
 _MOST_GROWTH = 100  # bits
 
 

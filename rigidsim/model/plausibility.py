@@ -273,7 +273,7 @@ def _near_resonance(
 ) -> Iterator[Caution]:
     """A spin within a per cent of 1:1, 3:2, 1:2 or 2:1 with the orbit that just misses the resonance.
 
-    It is told if it is outside the libration and the attracting body is a known one, or if the spin is a
+    It warns outside the libration of a known attracting body, or if the spin is a
     multiple of the mean anomaly's rate while the resonance is with the mean longitude: then a sidereal period
     was given as the anomalistic one (about a known body also within the libration, which it makes large).
 
@@ -303,8 +303,8 @@ def _near_resonance(
         )
         pace = next((key for key in MEAN_MOTION_KEYS if getattr(table, key) is not None), "")
         if pace in ("", "period"):
-            told = "period" if pace else "the one of Kepler's third law"
-            text += f": {told} is anomalistic; give sidereal_period if a sidereal month or year is meant"
+            given = "period" if pace else "the one of Kepler's third law"
+            text += f": {given} is anomalistic; give sidereal_period if a sidereal month or year is meant"
         yield Caution(WarningCode.NEAR_RESONANCE, text)
 
 

@@ -24,7 +24,7 @@ Rounder = Callable[[Any], Any]
 
 
 @dataclass(frozen=True)
-class Drive:
+class EstimatedEffect:
     """Estimated effect of loads of unknown size (see ``rigidsim.model.load_estimate``), mpf."""
 
     energy: Any  # added energy of rotation, J
@@ -43,7 +43,7 @@ class Scaling:
     rates: tuple[int, int, int]  # relative to 1 / (unit of time)
     length: int = 0
     speed: int = 0
-    drive: Drive | None = None  # the estimate used for loads of unknown size
+    drive: EstimatedEffect | None = None  # the estimate used for loads of unknown size
     own: Mapping[str, int] = field(default_factory=dict)  # of user-defined states
     direction: int = 1  # of internal time: -1 in a run that goes backwards
 
@@ -78,7 +78,7 @@ def exponent(context: Any, value: Any) -> int:
     return 1 - context.frexp(1 / value)[1]
 
 
-def largest_rates(scene: Scene, drive: Drive | None = None) -> list[Any]:
+def largest_rates(scene: Scene, drive: EstimatedEffect | None = None) -> list[Any]:
     """Upper bounds of the absolute body rates over the whole motion from energy and momentum (mpf, rad/s).
 
     For a free body in principal axes both 2 E I_max - L^2 and L^2 - 2 E I_min are sums of squares with
@@ -161,7 +161,7 @@ def gyroscopic_rate(scene: Scene) -> Any:
     return total
 
 
-def _flight_scales(scene: Scene, drive: Drive | None) -> tuple[Any, Any]:
+def _flight_scales(scene: Scene, drive: EstimatedEffect | None) -> tuple[Any, Any]:
     """Expected largest distance from the origin (m) and speed (m/s)."""
     context = scene.context
     assert scene.position is not None
@@ -188,7 +188,7 @@ def _point_mass_scales(scene: Scene) -> tuple[Any, Any]:
     return context.maximum(farthest), context.maximum(swiftest)
 
 
-def choose_scaling(scene: Scene, drive: Drive | None = None) -> Scaling:
+def choose_scaling(scene: Scene, drive: EstimatedEffect | None = None) -> Scaling:
     """The units of a scene; a pure function of it, so that the same config gives the same bits."""
     context, body = scene.context, scene.body
     bounds = largest_rates(scene, drive)

@@ -120,8 +120,8 @@ def flown_about(config: Config) -> SeenSource | None:
     if not free_flight(config):
         return None
     found = [x for x in sources_of(config) if hasattr(x.fields, "atmosphere_rate")]
-    told = [x for x in found if x.extended or x.fields.atmosphere_rate is not None]  # type: ignore[attr-defined]
-    return next(iter(told or found), None)
+    with_air = [x for x in found if x.extended or x.fields.atmosphere_rate is not None]  # type: ignore[attr-defined]
+    return next(iter(with_air or found), None)
 
 
 # --- what the body sees, in numbers or in expressions -------------------------------------------------------

@@ -16,7 +16,7 @@ from rigidsim.model.rotations import Symbolic, SymbolicMatrix
 class RotatingBody:
     """A body that turns: everything that is named after it.
 
-    The names of its states begin with a prefix, which tells several bodies apart.
+    The names of its states begin with a prefix, which distinguishes several bodies.
     """
 
     def __init__(self, prefix: str = "") -> None:

@@ -391,7 +391,8 @@ def assemble_states(
         vertical=requirements.vertical, flies=flies, loads=list(plan.loads), orbit_tags=plan.orbit_tags,
         surfaces=plan.surfaces, tables=plan.tables, clocked=plan.clocked,
     )  # fmt: skip
-    if m.slip is not None and m.attitude is not None and formulation.carries_rates:  # turns by what takes it
+    # turns by what takes it
+    if m.rate_correction is not None and m.attitude is not None and formulation.carries_rates:
         m = replace(m, attitude=formulation.attitude(plan, m.rates, number))
     blocks = formulation.blocks(m, plan)
     if flies:

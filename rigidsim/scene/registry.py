@@ -206,7 +206,7 @@ class SceneLoad:
         """Whether one that is always zero is carried all the same, for what expressions read of it."""
         return False
 
-    def among(self, masses: PointMasses) -> SceneLoad:
+    def with_point_masses(self, masses: PointMasses) -> SceneLoad:
         """The load where the point masses are elsewhere: itself, unless its source is one of them."""
         return self
 

@@ -87,7 +87,7 @@ class FromStates(AnyStart):
         super().__init__(scene, precision_of("double"))
         if not self.plain:
             raise NotFromStates("its equations change along the motion (tables, kernels or switches)")
-        if self._system.mechanics.slip is not None:
+        if self._system.mechanics.rate_correction is not None:
             raise NotFromStates("its body is distorted, so that rates alone don't tell its momentum")
 
     @cached_property

@@ -52,7 +52,7 @@ def _expressions(system: System, wanted: System, precision: Precision) -> list[S
     exponents = dict(zip(wanted.states, wanted.state_exponents, strict=True))
     own = dict(zip(system.states, zip(system.variables, system.state_exponents, strict=True), strict=True))
     same = system.formulation.name == wanted.formulation.name
-    if m.attitude is None or (m.slip is not None and not same):
+    if m.attitude is None or (m.rate_correction is not None and not same):
         return None
     given: dict[str, tuple[Symbolic, int]] = {}
     if not same:

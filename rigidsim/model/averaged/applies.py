@@ -141,16 +141,18 @@ def kept_resonance(
     return kept[0] if kept else None
 
 
-def told_of_resonances(sources: Sequence[Source]) -> str:
+def resonance_search(sources: Sequence[Source]) -> str:
     """How resonances with point masses were looked for; empty without point masses."""
     masses = [(source.of.placement.name, source.motion > 0) for source in sources if source.of.reacts]
     bound, passing = ([name for name, holds in masses if holds is held] for held in (True, False))
-    told = []
+    searches = []
     if bound:
-        told.append(f"with the osculating orbits of the start for {', '.join(bound)}")
+        searches.append(f"with the osculating orbits of the start for {', '.join(bound)}")
     if passing:
-        told.append(f"not for {', '.join(passing)}, not bound to the body and slower than all of its rates")
-    return f"; resonances were looked for {', '.join(told)}" if told else ""
+        searches.append(
+            f"not for {', '.join(passing)}, not bound to the body and slower than all of its rates"
+        )
+    return f"; resonances were looked for {', '.join(searches)}" if searches else ""
 
 
 def _refuse_resonance(
@@ -236,8 +238,10 @@ def _combination(orders: tuple[int, int, int], body: float) -> str:
     i, j, k = orders
     signed = -k if body > 0 else k
     terms = [(i, "g"), (j, "l"), (signed, "n")]
-    told = [f"{'+' if c > 0 else '-'} {abs(c) if abs(c) != 1 else ''}{name}" for c, name in terms if c]
-    return " ".join(told).removeprefix("+ ")
+    signed_terms = [
+        f"{'+' if c > 0 else '-'} {abs(c) if abs(c) != 1 else ''}{name}" for c, name in terms if c
+    ]
+    return " ".join(signed_terms).removeprefix("+ ")
 
 
 def refused(level: str, against: str, remedy: str = _FULL) -> ConfigError:

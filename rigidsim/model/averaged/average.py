@@ -32,7 +32,7 @@ _ROUNDS = 4  # iterations; each gains a factor of the nutation's size
 
 DIRECTION = ["sx", "sy", "sz"]
 """States: direction of the momentum, space axes; its mean if nothing is added back."""
-TOLD = (
+OBSERVABLES = (
     "angular_momentum", "angular_momentum_norm", "energy", "figure_axis", "spin_axis", "momentum_axis",
     "right_ascension", "declination", "obliquity", "node_longitude", "point_mass_position", "precession",
     "longitude_of_perihelion_of_date", "climatic_precession", "orbit_eccentricity", "insolation",
@@ -62,9 +62,9 @@ class Average:
         """Whether it averages over the sources' orbits as well."""
         return self.level == ORBIT_AVERAGED
 
-    def tells(self, name: str) -> bool:
+    def provides(self, name: str) -> bool:
         """Whether it can provide an observable, as far as the scene has it."""
-        return name in TOLD or (name == "resonant_angle" and self.resonance is not None)
+        return name in OBSERVABLES or (name == "resonant_angle" and self.resonance is not None)
 
     @property
     def longitude(self) -> Carried:
@@ -141,7 +141,7 @@ def average_of(
         wobble = Wobble.of(motion, unit(context, momentum))
         alone = [load for load in loads if load.gradient_source is None]
         if along is not None:
-            resonance = None if along.resonance is None else along.resonance.among(sources)
+            resonance = None if along.resonance is None else along.resonance.with_source_in(sources)
         else:
             resonance = None if alone else kept_resonance(scene, wobble, sources, motion)
         if resonance is not None:

@@ -60,7 +60,7 @@ PARAMETER = 0.98
 """Largest k^2 over whose polhodes torques are averaged."""
 _STEP = 0.05  # of the time in which P or Q change by their own size
 _NEGLIGIBLE = 1e-7  # of the momentum: a wobble that no longer sets the step, but for stability
-_NEAR = 1e-3  # of a step, to which the time at which the separatrix is reached is told
+_NEAR = 1e-3  # of a step: how exactly the time of reaching the separatrix is reported
 _NOTHING = 1e-150  # of the momentum at the start, whose square doubles still hold
 _MOST_STEPS = 20_000
 _NODES = 256
@@ -165,8 +165,8 @@ class DrivingTorques:
         """Nodes for sums over f that err by less than epsilon for all these amplitudes.
 
         At least those that the weight needs (``nodes_needed``); doubled until sums over twice as many agree
-        in double precision, which tells the smoothness of the torque itself, and in proportion to the digits
-        beyond.
+        in double precision, which measures the smoothness of the torque itself, and in proportion to the
+        digits beyond.
 
         Raises:
             ArithmeticError: a torque that too many nodes don't resolve.

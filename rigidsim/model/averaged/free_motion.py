@@ -15,7 +15,7 @@ in the body (Landau & Lifshitz, Mechanics, section 37), and
 Averaged over both angles the tensor is axisymmetric about L, so that the torque of a distant body is that of
 an axisymmetric one whose C - A is (3 <m . I m> - tr I) / 2 (Chernousko 1963; Cochran 1972).
 
-All polhodes about one principal axis are told by two amplitudes: the momentum of a free body is
+Two amplitudes describe all polhodes about one principal axis: the momentum of a free body is
 
     L1 = sqrt(r) Q cos f,   L2 = Q sin f,   L3 = P dn,   dn^2 = 1 - k^2 sin^2 f,
     r = I1 (I2 - I3) / (I2 (I1 - I3)),   k^2 = (1 - r) (Q / P)^2,   f' = P dn (I3 - I2) / (sqrt(r) I2 I3),
@@ -126,7 +126,7 @@ def _ordered(context: Any, body: RigidBody, momentum: Vector, length: Any) -> tu
         picked = (1, 2, 0)
     else:
         along = [dot(axis, momentum) / length for axis in axes]
-        # the sign of L^2 - 2 E I2 tells which axis is circled
+        # the sign of L^2 - 2 E I2 decides which axis is circled
         beyond = along[0] ** 2 * (1 - middle / least) + along[2] ** 2 * (1 - middle / most)
         if abs(beyond) <= negligible(context):
             raise Separatrix

@@ -58,8 +58,8 @@ class AveragedMechanics(Mechanics):
     def turning_rate(self) -> Any:
         return self.of.rate_bound
 
-    def tells(self, name: str) -> bool:
-        return self.of.tells(name)
+    def provides(self, name: str) -> bool:
+        return self.of.provides(name)
 
     @property
     def kept_by_average(self) -> str | None:

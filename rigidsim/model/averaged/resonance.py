@@ -115,7 +115,7 @@ class Resonance:
         zero, plus, minus = (abs(float(x)) for x in self.coefficients)
         return math.sqrt(4 * float(self.strength) * max(zero, plus, minus) / float(self.motion.moments[2]))
 
-    def among(self, sources: Sequence[Source]) -> Self:
+    def with_source_in(self, sources: Sequence[Source]) -> Self:
         """The same resonance with the same one of these sources."""
         (source,) = (x for x in sources if x.number == self.source.number)
         return replace(self, source=source)

@@ -9,7 +9,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.averaged.applies import told_of_resonances
+from rigidsim.model.averaged.applies import resonance_search
 from rigidsim.model.averaged.average import DIRECTION, Average, average_of
 from rigidsim.model.averaged.mechanics import (
     AMPLITUDES,
@@ -52,13 +52,13 @@ class Averaged(Formulation):
         self.average, self.longitude = average, average.longitude
         summed = average.driven is not None and average.driven.nodes
         self.wide = average.resonance is not None or bool(summed)
-        self.variables = Variables(average.level, general=False)  # type: ignore[misc]  # told by the scene
+        self.variables = Variables(average.level, general=False)  # type: ignore[misc]  # the scene decides
 
     @classmethod
     def along(cls, scene: Scene, loads: Sequence[Load], along: Average | None) -> Averaged:
         """The average of a scene, or the one already chosen of a motion that the scene is a part of."""
         average = average_of(scene, loads, replace(choose_scaling(scene), rates=(0, 0, 0)), along)
-        _refuse_untold(average, scene.config.output.record)
+        _refuse_unavailable(average, scene.config.output.record)
         refuse_without_plane(scene, loads)
         return cls(average)
 
@@ -121,7 +121,7 @@ class Averaged(Formulation):
         why = _WHY[average.level]
         if average.driven is not None:
             why = _WHY_TURNED if average.sources else _WHY_AT_REST
-        why += told_of_resonances(average.sources)
+        why += resonance_search(average.sources)
         blocks = [StateBlock(DIRECTION, m.derivatives, average.start, why=why)]
         if isinstance(m, DrivenMechanics):
             blocks.append(_amplitudes(m))
@@ -145,13 +145,13 @@ def _amplitudes(m: DrivenMechanics) -> StateBlock:
     return StateBlock(AMPLITUDES, m.amplitude_rates, m.driven.states(unit), exponents=[unit] * 2, why=why)
 
 
-def _refuse_untold(average: Average, record: Sequence[str] | None) -> None:
+def _refuse_unavailable(average: Average, record: Sequence[str] | None) -> None:
     """Refuse observables that need every rotation resolved."""
     for name in record or ():
         if name in _OF_FIGURE and not average.figure:
             why = "the body tumbles, so that its figure axis points nowhere on average; record momentum_axis "
             why += "instead"
-        elif not average.tells(name):
+        elif not average.provides(name):
             why = f'needs every rotation, which [model] level = "{average.level}" averages over'
         else:
             continue

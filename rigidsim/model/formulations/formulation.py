@@ -1,4 +1,4 @@
-"""A formulation: the states in which the rotation of a scene is written, and what can be told of them.
+"""A formulation: the states in which the rotation of a scene is written, and what can be computed from them.
 
 ``Formulation`` is the protocol of all of them, ``formulates`` registers one. Everything else, from the flight
 to the invariants, is written in terms of the attitude and the angular velocity as expressions of its states.
@@ -175,7 +175,7 @@ def rate_block(m: Mechanics, why: str) -> StateBlock:
         context.ldexp(w, scaling.time - e) for w, e in zip(m.starting_rates, scaling.rates, strict=True)
     ]
     exponents = [e - scaling.time for e in scaling.rates]
-    if m.slip is not None:
+    if m.rate_correction is not None:
         why += "; the states are the rates that the undistorted body would have with this angular momentum"
     return StateBlock(BODY.rates, m.accelerations, initial, exponents=exponents, why=why)
 

@@ -155,8 +155,8 @@ class ByPlacedSource(Placed):
         orbit = self.placement.orbit
         return orbit if orbit is not None and orbit.circular and orbit.fixed_plane else None
 
-    def among(self, masses: PointMasses) -> SceneLoad:
-        return replace(self, placement=self.placement.among(masses))
+    def with_point_masses(self, masses: PointMasses) -> SceneLoad:
+        return replace(self, placement=self.placement.with_point_masses(masses))
 
     # --- what it does ---------------------------------------------------------------------------------------
 
@@ -212,8 +212,8 @@ class Attraction(ByPlacedSource):
 
     def pictured(self) -> dict[str, Any] | None:
         what = "source" if self.attracting_point is None else "attractor"
-        told = {"what": what, "gravitational_parameter": float(self.gravitational_parameter)}
-        return None if self.reacts else told | self.placement.pictured()
+        depiction = {"what": what, "gravitational_parameter": float(self.gravitational_parameter)}
+        return None if self.reacts else depiction | self.placement.pictured()
 
     def fixed_source(self, scene: Scene) -> tuple[Any, Vector] | None:
         if self.placement.flies or not self.placement.rests:

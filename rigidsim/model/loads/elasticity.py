@@ -7,7 +7,7 @@ distorted tensor's rate of change is needed nowhere: M' = M x w + N, w = (I + D)
 Energy of rotation with the elastic one is w . M / 2 + (K/8) F : F, where (K/2) F is D without its constant
 part and K = 2 k R^5/(3 G): the Legendre transform of a linear elastic body. Without delay it is conserved
 with the potential energy wherever a rigid body's energy is. With one, E0 = w0 . M / 2 has the exact
-derivative w . N + (w0 - w) . M', which tells what the distortion takes or gives: the rest is a function of
+derivative w . N + (w0 - w) . M', the power that the distortion takes or gives: the rest is a function of
 the state.
 
 With the Love number k, the radius R and a delay tau, the tensor of inertia gains D = d(t - tau),
@@ -141,18 +141,18 @@ class Distortion:
         found = self._joined(fixed, _outer(rate, None, self.spin))
         if self.delay != 0:
             found = self._delayed(rate, tides)
-        return found, self.slip(found, bare)
+        return found, self.rate_correction(found, bare)
 
     def _without_delay(self, bare: list[Any], tides: Sequence[SeenTide]) -> tuple[list[Any], Matrix | None]:
         """The rate w*, and the tides' part of the tensor with its trace."""
         fixed = self._sum([_outer(tide.place, tide.fifth, -tide.lift) for tide in tides])
         rate = bare
         for _ in range(self.iterations):
-            slip = self.slip(self._joined(fixed, _outer(rate, None, self.spin)), bare)
-            rate = _plus(bare, slip)
+            rate_correction = self.rate_correction(self._joined(fixed, _outer(rate, None, self.spin)), bare)
+            rate = _plus(bare, rate_correction)
         return rate, fixed
 
-    def slip(self, distortion: Matrix, bare: list[Any]) -> list[Any]:
+    def rate_correction(self, distortion: Matrix, bare: list[Any]) -> list[Any]:
         """-(I + D)^-1 D w0, by the adjugate."""
         (a, f, e), (_, b, d), (_, _, c) = [
             [total([x, y]) if x != 0 else y for x, y in zip(*rows, strict=True)]
@@ -288,7 +288,7 @@ _MOST = 0.1  # of a moment, up to which a linear response makes sense
 WHERE = "[body] elasticity"
 _LATE, _TOO_LATE = 0.3, 1.0
 """Radians by which body and source together may turn within the delay: at the first, what the expansion
-leaves out is some percent of what the delay does, which is told, and at the second about as much.
+leaves out is some percent of what the delay does, which is reported, and at the second about as much.
 """
 _WIDE = (0.05, 1.0)
 """C/(M R^2) of a body whose mean radius is R: 2/5 is a sphere's, 0.21 Saturn's."""
@@ -343,7 +343,7 @@ class Elasticity(Load, Carrier):
     title = "elasticity"
     wide = True  # some hundreds of expressions
     changes = "the moments of an elastic body vary"
-    conservative = True  # its work is told by ``supplied_power``
+    conservative = True  # its work is in ``supplied_power``
     nothing = {"love_number": 0}  # noqa: RUF012
 
     @classmethod
@@ -425,13 +425,13 @@ class Elasticity(Load, Carrier):
 
     def shape(self, m: Kinematics) -> MassDistribution:
         """The distorted tensor, internal units."""
-        tensor, slip = self._of(m, Distortion.found)
+        tensor, rate_correction = self._of(m, Distortion.found)
         rows = zip(m.numbers.inertia, tensor, strict=True)
         matrix = [
             [total([rounded(m.number(x)), y]) if x != 0 else y for x, y in zip(*row, strict=True)]
             for row in rows
         ]
-        return MassDistribution(matrix, None, slip, tensor)
+        return MassDistribution(matrix, None, rate_correction, tensor)
 
     def power(self, m: Kinematics) -> Symbolic:
         """Power that the tides put into the distortion, internal units of energy over time."""
@@ -591,7 +591,7 @@ class Elasticity(Load, Carrier):
     def carried_energy(self, m: Kinematics) -> Symbolic | None:
         """(w - w0) . M / 2, and the elastic energy."""
         assert m.shape is not None
-        assert m.slip is not None
+        assert m.rate_correction is not None
         context, scaling = m.scene.context, m.scaling
         offset = self._constants(m.scene, scaling.time, scaling.inertia)[3]
         bent = [
@@ -601,7 +601,7 @@ class Elasticity(Load, Carrier):
         ]
         size = context.ldexp(3 / (4 * self.strength), scaling.inertia + 2 * scaling.time)
         elastic = rounded(m.number(size)) * hy.sum([x * x for x in bent])
-        lost = [0.5 * x * y for x, y in zip(m.slip, m.own_momentum, strict=True)]
+        lost = [0.5 * x * y for x, y in zip(m.rate_correction, m.own_momentum, strict=True)]
         return hy.sum([*lost, elastic])
 
     def lends(self, m: Kinematics) -> bool:
@@ -624,9 +624,9 @@ class Elasticity(Load, Carrier):
         if not self.lends(m):
             return None
         assert isinstance(m, Mechanics)
-        assert m.slip is not None
+        assert m.rate_correction is not None
         turning = m.inertia.times(in_common_unit(m.accelerations, m.numbers.rate_units, m.number))
-        terms = [-(x * y) for x, y in zip(m.slip, turning, strict=True)]
+        terms = [-(x * y) for x, y in zip(m.rate_correction, turning, strict=True)]
         rigid = replace(m, shape=None)
         for load in m.loads:
             if not load.conservative or load is self:
@@ -638,7 +638,7 @@ class Elasticity(Load, Carrier):
                     terms.append(sign * expression * along)
         return hy.sum(terms)
 
-    # --- what readers are told ------------------------------------------------------------------------------
+    # --- what readers see --------------------------------------------------------------------------------
 
 
 def _rounded(m: Kinematics, matrix: Matrix) -> Matrix:

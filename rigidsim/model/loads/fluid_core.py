@@ -43,7 +43,7 @@ from rigidsim.scene.tracing import plain
 STATES = ("core_wx", "core_wy", "core_wz")
 _ROUNDING_OF_INPUT = 1e-14  # relative, of moments that a double-precision program printed
 _MOST_DAMPED = 1e12  # times within a run that friction may take the core to the mantle's rate: as many steps
-_STIFF = 100.0  # by which friction may be faster than the rotation before it is told
+_STIFF = 100.0  # by which friction may be faster than the rotation before the run warns of it
 
 
 @register_load(body="core")
@@ -66,8 +66,8 @@ class FluidCore(Load):
     rate: Vector | None
 
     title = "fluid core"
-    conservative = True  # what friction takes is told by ``supplied_power``
-    loose = True  # see ``carriers.Loose``
+    conservative = True  # what friction takes is in ``supplied_power``
+    loose = True  # see ``Load``
     nothing = {"moment": 0}  # noqa: RUF012
 
     @classmethod
@@ -154,7 +154,7 @@ class FluidCore(Load):
         unit = m.scene.context.ldexp(m.scene.context.one, self.unit(m))
         return in_common_unit(list(hy.make_vars(*STATES)), [unit] * 3, m.number)
 
-    def _slip(self, m: Kinematics) -> list[Symbolic]:
+    def _relative_rate(self, m: Kinematics) -> list[Symbolic]:
         """w - v."""
         return [w - v for w, v in zip(m.rates, self.rates(m), strict=True)]
 
@@ -163,15 +163,17 @@ class FluidCore(Load):
 
     def extra_states(self, m: Kinematics) -> StateBlock:
         context, f, unit = m.scene.context, self.flattening, self.unit(m)
-        rates, slip = self.rates(m), self._slip(m)
-        across = cross(rates, slip)
+        rates, relative_rate = self.rates(m), self._relative_rate(m)
+        across = cross(rates, relative_rate)
         if self.friction != 0:
             drag = m.number(context.ldexp(self.friction / (self.polar * (1 - f)), m.scaling.time))
-            across = [x + drag * d for x, d in zip(across, slip, strict=True)]
+            across = [x + drag * d for x, d in zip(across, relative_rate, strict=True)]
         slopes = [[x] for x in across]
         if f != 0:
             along, spin = self._along(m, across), self._along(m, rates)
-            for row, p, turned in zip(slopes, self.axis, cross(m.fixed(self.axis), slip), strict=True):
+            for row, p, turned in zip(
+                slopes, self.axis, cross(m.fixed(self.axis), relative_rate), strict=True
+            ):
                 row += [m.number(-f * p) * along] if p != 0 else []
                 row.append(m.number(f / (1 - f)) * (spin * turned))
         own = m.number(context.ldexp(context.one, -unit))
@@ -202,15 +204,15 @@ class FluidCore(Load):
                 found.append(([size * x for x in cross(self.axis, axis)], spin * rate))
         if self.friction != 0:
             drag = context.ldexp(self.friction, -m.scaling.momentum)
-            for axis, slip in zip(unit_vectors(context), self._slip(m), strict=True):
-                found.append(([-drag * x for x in axis], slip))
+            for axis, relative_rate in zip(unit_vectors(context), self._relative_rate(m), strict=True):
+                found.append(([-drag * x for x in axis], relative_rate))
         return found
 
     def supplied_power(self, m: Kinematics) -> Symbolic | None:
         if self.friction == 0:
             return None
         drag = m.number(m.scene.context.ldexp(self.friction, -m.scaling.momentum))
-        return -(drag * hy.sum([d * d for d in self._slip(m)]))
+        return -(drag * hy.sum([d * d for d in self._relative_rate(m)]))
 
     def carried_at_start(self, scene: Scene) -> tuple[Vector, Any]:
         rate = self.at_start(scene)
@@ -237,7 +239,7 @@ class FluidCore(Load):
             text += "fast as anything turns, and steps are as short as that; without a core the motion is "
             yield Caution(WarningCode.FRICTION_STIFF, text + "nearly the same")
 
-    # --- what readers are told ------------------------------------------------------------------------------
+    # --- what readers see --------------------------------------------------------------------------------
 
     def pictured(self) -> dict[str, Any]:
         return {

@@ -53,7 +53,7 @@ class MovedMass(Load, Carrier):
 
     title = "principal_moments"
     changes = "principal_moments vary"
-    conservative = True  # the work of what moves it is told by ``supplied_power``
+    conservative = True  # the work of what moves it is in ``supplied_power``
 
     @classmethod
     def brought_by(cls, config: Config) -> bool:
@@ -187,7 +187,7 @@ class MovedMass(Load, Carrier):
                     found = max(found, *(min(a / b, _MOST) for a, b in zip(begun, moments, strict=True)))
         return found
 
-    # --- what readers are told ------------------------------------------------------------------------------
+    # --- what readers see --------------------------------------------------------------------------------
 
 
 def _diagonal(elements: list[Any]) -> list[list[Any]]:

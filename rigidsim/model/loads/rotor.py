@@ -57,7 +57,7 @@ class Rotor(Load):
     motor: Expression | None
     fixed: bool
 
-    conservative = True  # all that isn't is told by ``supplied_power``
+    conservative = True  # all that isn't is in ``supplied_power``
 
     @classmethod
     def resolve(cls, fields: RotorTable, around: Setting) -> Rotor:
@@ -210,7 +210,7 @@ class Rotor(Load):
         """See ``scaling.Gyroscopic``."""
         return self.carried_at_start(scene)[0]
 
-    # --- what readers and pictures are told -----------------------------------------------------------------
+    # --- what readers and pictures show -------------------------------------------------------------------
 
     def pictured(self) -> dict[str, Any]:
         return {

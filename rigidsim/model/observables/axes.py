@@ -27,9 +27,9 @@ from rigidsim.model.observables.observable import (
     Angle,
     Observable,
     continuous_angles,
+    described_by,
     only_when_named,
     register_all,
-    told,
 )
 from rigidsim.model.rotations import Symbolic, apply, unit
 from rigidsim.model.scaling import source_rate
@@ -80,7 +80,7 @@ def _sky(convention: str) -> Callable[[Mechanics], Mapping[str, str]]:
         where = "mean equator and equinox of J2000" if turned else "the space axes' XY plane and X"
         return f"{convention}, against {where}"
 
-    return told(against, figure=True)
+    return described_by(against, figure=True)
 
 
 # --- the kind of rotation, by which some variables are recorded by default ----------------------------------
@@ -133,17 +133,18 @@ register_all(
     Observable(
         "figure_axis", SPACE, "1", "direction of the figure axis", lambda m: unit(m.figure_space),
         frame="space axes", needs=("attitude",), by_default=is_planet,
-        attributes=told("unit vector", figure=True),
+        attributes=described_by("unit vector", figure=True),
     ),
     Observable(
         "spin_axis", SPACE, "1", "direction of the angular velocity", lambda m: unit(m.spin_space),
-        frame="space axes", needs=("attitude",), by_default=only_when_named, attributes=told(_AT_REST),
+        frame="space axes", needs=("attitude",), by_default=only_when_named,
+        attributes=described_by(_AT_REST),
     ),
     Observable(
         "momentum_axis", SPACE, "1", "direction of the angular momentum",
         lambda m: unit(m.momentum_space),
         frame="space axes", needs=("attitude",), by_default=only_when_named,
-        attributes=told(_AT_REST),
+        attributes=described_by(_AT_REST),
     ),
     continuous_angles(
         "right_ascension", AXIS, "right ascension of the figure, spin and momentum axes",
@@ -160,7 +161,7 @@ register_all(
     continuous_angles(
         "prime_meridian", (), "angle of the prime meridian, the IAU's W", _meridian,
         frame="space axes", needs=("attitude",), absent=_no_meridian,
-        attributes=told(
+        attributes=described_by(
             "from where the equator of the figure axis rises through the mean equator of J2000, along it in "
             "the direct sense to the figure's first axis; turns counted; NaN at the poles",
             figure=True,
@@ -170,14 +171,14 @@ register_all(
         "obliquity", AXIS, "rad", "obliquity of the figure, spin and momentum axes",
         lambda m: [hy.atan2(hy.sqrt(u * u + v * v), s) for u, v, s in _on_plane(m)],
         frame="space axes", needs=("attitude", "plane"), by_default=is_planet,
-        attributes=told("angle from the reference plane's normal, 0 to pi", figure=True, plane=True),
+        attributes=described_by("angle from the reference plane's normal, 0 to pi", figure=True, plane=True),
     ),
     continuous_angles(
         "node_longitude", AXIS,
         "longitude of the node of the equator of the figure, spin and momentum axes",
         lambda m: [Angle(u, -v) for u, v, _ in _on_plane(m)],
         frame="space axes", needs=("attitude", "plane"), by_default=is_planet,
-        attributes=told(
+        attributes=described_by(
             "where the equator whose pole is the axis rises through the reference plane, from X turned by "
             "the smallest rotation that takes Z to the normal, in the direct sense; turns counted; NaN where "
             "the obliquity is 0 or pi",

@@ -27,9 +27,9 @@ from rigidsim.model.observables.observable import (
     Angle,
     Observable,
     continuous_angles,
+    described_by,
     only_when_named,
     register_all,
-    told,
 )
 from rigidsim.model.rotations import Symbolic, unit
 from rigidsim.scene import attitude
@@ -118,8 +118,10 @@ def _no_insolation(m: Mechanics) -> str | None:
     return _no_orbit(m)
 
 
-def _told(convention: str) -> Callable[[Mechanics], Mapping[str, str]]:
-    return told(f"{convention}; in the plane of the orbit of the first source with elements", figure=True)
+def _attributes(convention: str) -> Callable[[Mechanics], Mapping[str, str]]:
+    return described_by(
+        f"{convention}; in the plane of the orbit of the first source with elements", figure=True
+    )
 
 
 _NEEDS = ("attitude",)
@@ -131,27 +133,27 @@ register_all(
     continuous_angles(
         "precession", (), "precession of the equinox along the orbit", _precession,
         needs=_NEEDS, absent=_no_orbit,
-        attributes=_told("from the equinox of the start, in the direct sense; turns counted"),
+        attributes=_attributes("from the equinox of the start, in the direct sense; turns counted"),
     ),
     continuous_angles(
         "longitude_of_perihelion_of_date", (), "longitude of perihelion from the moving equinox",
         lambda m: [Angle(*reversed(_perihelion(m)))],
-        needs=_NEEDS, absent=_no_orbit, attributes=_told(f"turns counted; {_PERIHELION}"),
+        needs=_NEEDS, absent=_no_orbit, attributes=_attributes(f"turns counted; {_PERIHELION}"),
     ),
     Observable(
         "climatic_precession", (), "1", "climatic precession", _climatic,
         needs=_NEEDS, by_default=only_when_named, absent=_no_orbit,
-        attributes=_told(f"e sin of longitude_of_perihelion_of_date; {_PERIHELION}"),
+        attributes=_attributes(f"e sin of longitude_of_perihelion_of_date; {_PERIHELION}"),
     ),
     Observable(
         "orbit_eccentricity", (), "1", "eccentricity of the orbit",
         lambda m: [hy.sqrt(sum((x * x for x in _eccentric(m)), hy.expression(0.0)))],
         by_default=only_when_named, absent=_no_orbit,
-        attributes=told("of the first source with elements"),
+        attributes=described_by("of the first source with elements"),
     ),
     Observable(
         "insolation", (), "W m-2", "mean insolation of a day", _insolation,
         lambda m: [0], needs=_NEEDS, by_default=only_when_named, absent=_no_insolation,
-        attributes=_told("at the latitude and the longitude of the Sun that [output] insolation gives"),
+        attributes=_attributes("at the latitude and the longitude of the Sun that [output] insolation gives"),
     ),
 )  # fmt: skip

@@ -137,7 +137,7 @@ def _momentum_kept(m: Mechanics) -> str | None:
 
 
 def _conservative(m: Mechanics) -> str | None:
-    if not m.conserves_energy or m.lent_energy is not None:
+    if not m.conserves_energy or m.energy_stored_by_drives is not None:
         return None
     return "all loads have a potential that doesn't depend on time" if m.loads else "no load acts"
 
@@ -213,16 +213,16 @@ def _energy_balance(m: Mechanics) -> list[Symbolic]:
 def _work(m: Mechanics) -> list[Symbolic]:
     """The state, and what drives have put into what they drive since the start."""
     state = hy.make_vars(WORK)
-    if m.lent_energy is None:
+    if m.energy_stored_by_drives is None:
         return [state]
     unit = m.scene.context.ldexp(m.scene.context.one, m.work_unit - m.scaling.energy)
     lent = [x.carried_at_start(m.scene)[1] for x in m.carriers if x.lends(m)]
     begun = m.scene.context.ldexp(sum(lent, m.scene.context.zero), -m.scaling.energy)
-    return [hy.sum([m.number(unit) * state, m.lent_energy, hy.expression(m.number(-begun))])]
+    return [hy.sum([m.number(unit) * state, m.energy_stored_by_drives, hy.expression(m.number(-begun))])]
 
 
 def _work_exponent(m: Mechanics) -> int:
-    return m.work_unit if m.lent_energy is None else m.scaling.energy
+    return m.work_unit if m.energy_stored_by_drives is None else m.scaling.energy
 
 
 def linear_momentum(m: Mechanics) -> list[Symbolic]:

@@ -131,7 +131,9 @@ NEEDS: dict[str, Need] = {
     "source": Need(_sourced, lambda scene: "flight" if flies_about_source(scene) else None, _NO_SOURCE),
     "place": Need(lambda m: not m.scene.free_flight or m.velocity is not None, _flight_of_a_free_body),
     "rotors": Need(lambda m: bool(m.scene.tabled.get("rotors")), missing=_NO_ROTORS),
-    "fixed_rotors": Need(lambda m: m.lent_energy is not None and not m.driven_within, missing=_NO_ROTORS),
+    "fixed_rotors": Need(
+        lambda m: m.energy_stored_by_drives is not None and not m.driven_within, missing=_NO_ROTORS
+    ),
     "point_masses": Need(lambda m: m.scene.bodies is not None, missing=_NO_POINT_MASSES),
     "kernel": Need(lambda m: m.sky is not None, missing=_NO_KERNEL),
     "attractor": Need(lambda m: m.velocity is not None and any(x.attracting_point for x in m.loads)),
@@ -227,7 +229,7 @@ class Observable:
 
     def available(self, m: Mechanics) -> bool:
         """Whether the scene meets all needs and nothing else makes the quantity absent."""
-        return m.tells(self.name) and self.needed(m) and self.absent(m) is None
+        return m.provides(self.name) and self.needed(m) and self.absent(m) is None
 
     def needed(self, m: Mechanics) -> bool:
         """Whether the scene has what ``needs`` names."""
@@ -272,10 +274,10 @@ MOMENTUM = lambda m: m.scaling.momentum  # noqa: E731
 ENERGY = lambda m: m.scaling.energy  # noqa: E731
 
 
-def told(
+def described_by(
     convention: str | Callable[[Mechanics], str], *, figure: bool = False, plane: bool = False
 ) -> Callable[[Mechanics], Mapping[str, str]]:
-    """Attributes that tell readers a convention, and the figure axis and reference plane if it uses them."""
+    """Attributes that give a convention, and the figure axis and reference plane if it uses them."""
 
     def attributes(m: Mechanics) -> dict[str, str]:
         found = {"convention": convention if isinstance(convention, str) else convention(m)}

@@ -49,7 +49,7 @@ def _no_long_axis(m: Mechanics) -> str | None:
     return "the body has no single axis of smallest moment, whose libration it would be"
 
 
-def _told(convention: str) -> Callable[[Mechanics], Mapping[str, str]]:
+def _attributes(convention: str) -> Callable[[Mechanics], Mapping[str, str]]:
     return lambda m: {"convention": convention, "local_frame": local_frame(m).described}
 
 
@@ -75,7 +75,7 @@ register_all(
     continuous_angles(
         "roll_pitch_yaw", ("roll_pitch_yaw_component",), "roll, pitch and yaw", roll_pitch_yaw,
         frame="local frame to body axes", needs=_NEEDS, by_default=moves_slowly_in_orbit,
-        attributes=_told(
+        attributes=_attributes(
             "3-2-1 (yaw about z, pitch about y, roll about x) from the local frame (z to the source, y "
             "against the orbit's normal) to body axes; turns counted; roll and yaw are NaN where pitch is a "
             "quarter turn"
@@ -84,14 +84,15 @@ register_all(
     continuous_angles(
         "libration", ("libration_angle",), "libration of the axis of smallest moment", libration,
         frame="local frame", needs=_NEEDS, absent=_no_long_axis,
-        attributes=_told(
+        attributes=_attributes(
             "angles of the axis of smallest moment from the direction to the source: in the orbit's plane, "
             "positive forward, turns counted; out of it, positive towards the orbit's normal"
         ),
     ),
     Observable(
         "nadir", BODY, "1", "direction to the source", lambda m: local_frame(m).down,
-        frame="body axes", needs=_NEEDS, by_default=moves_slowly_in_orbit, attributes=_told("unit vector"),
+        frame="body axes", needs=_NEEDS, by_default=moves_slowly_in_orbit,
+        attributes=_attributes("unit vector"),
     ),
     Observable(
         "air_velocity", BODY, "m s-1", "velocity relative to the air", air_velocity,

@@ -37,7 +37,7 @@ def _drawn(m: Mechanics) -> dict[str, str]:
 
 
 def _kept(m: Mechanics) -> str | None:
-    if m.lent_energy is None or not m.conserves_energy:
+    if m.energy_stored_by_drives is None or not m.conserves_energy:
         return None
     return "a fixed rate costs its motor the work J s a . (w - w0), which it lends the body"
 
@@ -58,8 +58,8 @@ def _raises_tides(scene: Scene) -> bool:
 
 
 NEEDS |= {
-    "moved_mass": Need(lambda m: m.shape is not None and m.slip is None),
-    "distorted": Need(lambda m: m.slip is not None),
+    "moved_mass": Need(lambda m: m.shape is not None and m.rate_correction is None),
+    "distorted": Need(lambda m: m.rate_correction is not None),
     "tides": Need(
         lambda m: _raises_tides(m.scene),
         missing=unless(

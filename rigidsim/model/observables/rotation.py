@@ -28,10 +28,10 @@ from rigidsim.model.observables.observable import (
     Angle,
     Observable,
     continuous_angles,
+    described_by,
     only_when_named,
     register_all,
     same_unit,
-    told,
 )
 from rigidsim.model.rotations import Symbolic, along, apply, length, unit
 from rigidsim.scene import attitude
@@ -100,7 +100,7 @@ register_all(
     continuous_angles(
         "rotation_angle", (), "angle of rotation about the angular momentum", _rotation_angle,
         frame="space axes", needs=("attitude", "plane"), by_default=is_nearly_axial,
-        attributes=told(
+        attributes=described_by(
             lambda m: f"{_rotation_sum(m)} of andoyer_angles: from X, carried to the momentum's equator by "
             "the smallest rotations, to the figure's first axis; in the direct sense about the momentum; "
             "turns counted",
@@ -110,18 +110,18 @@ register_all(
     Observable(
         "rotation_rate", (), "rad s-1", "instantaneous rate of rotation", lambda m: [length(m.rates)],
         same_unit(lambda m: -m.scaling.time, 1), by_default=only_when_named,
-        attributes=told("norm of the angular velocity"),
+        attributes=described_by("norm of the angular velocity"),
     ),
     Observable(
         "rotation_period", (), "s", "instantaneous period of rotation (sidereal length of day)",
         lambda m: [m.number(2 * m.scene.context.pi) / length(m.rates)],
         same_unit(lambda m: m.scaling.time, 1), by_default=only_when_named,
-        attributes=told("2 pi / rotation_rate, against the stars; infinite at rest"),
+        attributes=described_by("2 pi / rotation_rate, against the stars; infinite at rest"),
     ),
     Observable(
         "andoyer_momenta", ("andoyer_momentum",), "kg m2 s-1", "Andoyer momenta", _andoyer_momenta,
         same_unit(MOMENTUM, 3), needs=("attitude", "plane"), by_default=only_when_named,
-        attributes=told(
+        attributes=described_by(
             "L along the figure axis, G the norm, H along the reference plane's normal",
             figure=True, plane=True,
         ),
@@ -129,7 +129,7 @@ register_all(
     continuous_angles(
         "andoyer_angles", ("andoyer_angle",), "Andoyer angles", _andoyer_angles,
         needs=("attitude", "plane"),
-        attributes=told(
+        attributes=described_by(
             "l about the figure axis, g about the momentum, h about the reference plane's normal: attitude = "
             "R3(h) R1(I) R3(g) R1(J) R3(l), cos I = H/G, cos J = L/G; turns counted; NaN where undefined",
             figure=True, plane=True,
@@ -189,10 +189,10 @@ def _no_largest(m: Mechanics) -> str | None:
     )
 
 
-def _polar_told(m: Mechanics) -> Mapping[str, str]:
+def _polar_attributes(m: Mechanics) -> Mapping[str, str]:
     first = ", ".join(m.scene.context.nstr(x, 17) for x in m.scene.figure.first)
     convention = "m1 = w1/w3, m2 = w2/w3 (IERS: x_p = m1, y_p = -m2); NaN where the spin is more than 45 "
-    shown = dict(told(convention + "degrees from the figure axis", figure=True)(m))
+    shown = dict(described_by(convention + "degrees from the figure axis", figure=True)(m))
     return {"convention": shown["convention"], "first_axis": f"[{first}] in body axes"} | shown
 
 
@@ -201,18 +201,18 @@ _NO_SPIN = "0 to pi; NaN where the body is at rest"
 register_all(
     Observable(
         "polar_motion", ("polar_motion_component",), "rad", "polar motion", _polar_motion,
-        frame="body axes", by_default=is_nearly_axial, attributes=_polar_told,
+        frame="body axes", by_default=is_nearly_axial, attributes=_polar_attributes,
         absent=_no_polar_motion,
     ),
     Observable(
         "wobble_angle", (), "rad", "angle of the angular momentum from the axis of largest moment",
         _wobble_angle, frame="body axes", by_default=is_nearly_axial,
-        attributes=told(_NO_SPIN), absent=_no_largest,
+        attributes=described_by(_NO_SPIN), absent=_no_largest,
     ),
     Observable(
         "nutation_angle", (), "rad", "angle of the figure axis from the angular momentum",
         lambda m: [_angle_between(m.fixed(m.scene.figure.pole), m.momentum_body)],
         frame="body axes", by_default=is_nearly_axial,
-        attributes=told(_NO_SPIN, figure=True),
+        attributes=described_by(_NO_SPIN, figure=True),
     ),
 )  # fmt: skip

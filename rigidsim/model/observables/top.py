@@ -21,9 +21,9 @@ from rigidsim.model.observables.observable import (
     Angle,
     Observable,
     continuous_angles,
+    described_by,
     register_all,
     same_unit,
-    told,
 )
 from rigidsim.model.rotations import Symbolic, along, apply, unit
 from rigidsim.scene.arithmetic import Vector
@@ -84,22 +84,22 @@ def _is_top(m: Mechanics) -> bool:
     return m.numbers.arm is not None
 
 
-def _tip_told(m: Mechanics) -> dict[str, str]:
+def _tip_attributes(m: Mechanics) -> dict[str, str]:
     point = tip_point(m)
-    told = "" if point is None else ", ".join(m.scene.context.nstr(x, 17) for x in point)
-    return {"point": f"[{told}] m in body axes"}
+    components = "" if point is None else ", ".join(m.scene.context.nstr(x, 17) for x in point)
+    return {"point": f"[{components}] m in body axes"}
 
 
 register_all(
     Observable(
         "tilt", (), "rad", "angle of the figure axis from the upward vertical", tilt,
         needs=("vertical",), by_default=_is_top,
-        attributes=told("from 0, upright, to pi, hanging", figure=True),
+        attributes=described_by("from 0, upright, to pi, hanging", figure=True),
     ),
     continuous_angles(
         "precession_angle", (), "precession of the figure axis about the vertical", precession_angle,
         frame="space axes", needs=("attitude", "vertical"), by_default=_is_top,
-        attributes=told(
+        attributes=described_by(
             "of the line of nodes from the horizontal X, about the upward vertical; turns counted; NaN where "
             "the figure axis is vertical",
             figure=True,
@@ -109,7 +109,7 @@ register_all(
         "spin_angle", (), "rotation about the figure axis",
         lambda m: [Angle(*_vertical(m)[:2])],
         needs=("attitude", "vertical"), by_default=_is_top,
-        attributes=told(
+        attributes=described_by(
             "of the body from the line of nodes; turns counted; NaN where the figure axis is vertical",
             figure=True,
         ),
@@ -117,6 +117,6 @@ register_all(
     Observable(
         "tip", SPACE, "m", "path of a point of the body", tip, same_unit(_tip_exponent, 3), "space axes",
         ("attitude", "place"), by_default=lambda m: _is_top(m) or m.scene.config.output.tip is not None,
-        attributes=_tip_told, absent=_no_tip,
+        attributes=_tip_attributes, absent=_no_tip,
     ),
 )  # fmt: skip

@@ -23,9 +23,9 @@ _LUNISOLAR = frozenset({"sun", "earth", "moon", "earth_moon_barycenter"})
 _BOTH, _PARTS = "earth_moon_barycenter", ("earth", "moon")
 _SAMPLES = 4000  # over a run
 _ROUNDS = 2  # of finer samples about the least distance
-_WINDOW = 100 * 365.25 * 86400.0  # s, in which a kernel tells the mean motion
+_WINDOW = 100 * 365.25 * 86400.0  # s, in which the mean motion is measured in a kernel
 _TURN = 0.2  # of a block: samples by which the mean motion is followed
-_LEAST_SHAPE = 0.01  # eccentricity, or inclination (rad) to the mean plane, whose apsides and nodes are told
+_LEAST_SHAPE = 0.01  # eccentricity or inclination (rad) from which apsides or nodes are reported
 
 
 @dataclass(frozen=True)

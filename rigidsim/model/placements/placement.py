@@ -48,7 +48,7 @@ class Circuit:
         nearest: (a/r)^3 at the closest approach, a being ``Placement.distance``.
         slow_rate: bound of the rate of node and periapsis together, rad/s, or an estimate.
         uncertainty: of the mean motion, rad/s.
-        passing_rate: angular rate at the closest approach, rad/s; None where the orbit tells it.
+        passing_rate: angular rate at the closest approach, rad/s; None where the orbit gives it.
     """
 
     motion: float = 0.0
@@ -195,7 +195,7 @@ class Placement:
 
     # --- of one of the point masses -------------------------------------------------------------------------
 
-    def among(self, masses: PointMasses) -> Placement:
+    def with_point_masses(self, masses: PointMasses) -> Placement:
         """The same where the point masses are elsewhere."""
         return self
 
@@ -395,7 +395,7 @@ class PlacedBySeries(Placement):
 
 
 _UNROLLED = 2
-_ALMOST_PARABOLIC = 0.99  # a larger eccentricity's harmonics, of which a few thousand are told, hardly differ
+_ALMOST_PARABOLIC = 0.99  # the few thousand harmonics computed hardly differ at larger eccentricities
 
 
 @dataclass(frozen=True)
@@ -424,7 +424,7 @@ class AmongMasses(Placement):
             rate=lambda scene: self.encounter(scene)[1],
         )  # fmt: skip
 
-    def among(self, masses: PointMasses) -> Placement:
+    def with_point_masses(self, masses: PointMasses) -> Placement:
         return replace(self, masses=masses)
 
     def away(self, m: Kinematics) -> list[Symbolic]:

@@ -12,7 +12,7 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.errors import ConfigError
-from rigidsim.model.scaling import Drive
+from rigidsim.model.scaling import EstimatedEffect
 from rigidsim.scene.choices import DEFAULT_METHOD, FULL, variables_named
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
@@ -250,7 +250,7 @@ class Families:
                 waiting = self._taken(made, waiting, result)
 
     @cached_property
-    def _drive(self) -> Drive | None:
+    def _drive(self) -> EstimatedEffect | None:
         """The load estimate as the base experiment's build makes it."""
         try:
             return prepare(self._members.sweep.base).system.scaling.drive

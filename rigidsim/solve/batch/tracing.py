@@ -20,7 +20,7 @@ from mpmath.libmp import from_man_exp
 
 from rigidsim.model.model_plan import plan_model
 from rigidsim.model.names import TANGENT
-from rigidsim.model.scaling import Drive
+from rigidsim.model.scaling import EstimatedEffect
 from rigidsim.model.system import System
 from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.config import Experiment
@@ -102,7 +102,7 @@ def trace(
     representative: Experiment,
     keys: Sequence[str],
     numbers: Sequence[ExactNumber],
-    drive: Callable[[], Drive | None] = lambda: None,
+    drive: Callable[[], EstimatedEffect | None] = lambda: None,
 ) -> TracedSystem:
     """Build the system of a member with its swept numbers, by their keys, as parameters. ``drive`` is the
     estimated effect of loads of unknown size, if there are any: a power of two in the units, which has to be
