@@ -9,7 +9,7 @@ precision over less of it, and what doesn't fit is listed as left out. Nothing i
 Each setting is measured in a separate process, to which speed, crashes and endless compilations are confined.
 Two integrators that are built alike can differ in speed for their whole life, by a factor of up to 2.6, so
 that speeds have to be compared over fresh processes. Speed is measured per natural step (of a closed form:
-per sample), in passes over the motion's beginning that are repeated until they can be told from noise.
+per sample), in passes over the motion's beginning that are repeated until they stand out from noise.
 Recording costs the same in every setting and isn't counted.
 
 The measurement is labelled data, with its Pareto front and the advice that follows from it.
@@ -403,7 +403,7 @@ def measure(
     budget: float = 90.0,
     repeats: int = 3,
     full: bool = False,
-    told: Callable[[str], None] = lambda _: None,
+    report: Callable[[str], None] = lambda _: None,
 ) -> xarray.Dataset:
     """Measure the settings of a scene: xarray data of the dimensions ``setting``, ``time``, ``invariant``.
 
@@ -422,7 +422,7 @@ def measure(
     settings = _settings(plan, full=full)
     wide = {s: s.precision == "quadruple" and s.has_steps for s in settings}
     tasks = [Task(s, plan.short_times if wide[s] else plan.times, _SINGLE * budget) for s in settings]
-    told(f"attitudes of {len(settings)} settings")
+    report(f"attitudes of {len(settings)} settings")
     done, left_out = 0, (None, math.nan, f"left out: the budget of {budget:g} s was used up before its turn")
     with Worker(experiment) as worker:
         found = _explored(experiment, worker, plan.references(), tasks, begun + _EXPLORING * budget)
@@ -431,7 +431,7 @@ def measure(
                 f"tradeoff: the default setting ({DEFAULT.title}), which costs are relative to, could not be "
                 f"measured: {problem}"
             )
-        told("the reference")
+        report("the reference")
         references = _references(plan, found)
         rows = []
         for task in tasks:
@@ -445,11 +445,11 @@ def measure(
             against = references[wide[task.setting]]
             rows.append(_Row(task.setting, part, against, status, problem, trial, units))
         until = begun + 1.1 * budget
-        told(f"speeds, process 1 of {repeats}")
+        report(f"speeds, process 1 of {repeats}")
         done += _timed(worker, plan, rows, 0, max(until, time.monotonic() + 30.0))
         for repeat in range(1, repeats):
             if time.monotonic() < until:
-                told(f"speeds, process {repeat + 1} of {repeats}")
+                report(f"speeds, process {repeat + 1} of {repeats}")
                 with Worker(experiment) as fresh:
                     done += _timed(fresh, plan, rows, repeat, until)
     return _dataset_of(experiment, plan, rows, references, done, time.monotonic() - begun)
@@ -501,7 +501,7 @@ def _timed(worker: Worker, plan: Plan, rows: list[_Row], repeat: int, until: flo
 
 # --- labelled data ------------------------------------------------------------------------------------------
 
-TOLD = (
+ATTRIBUTES = (
     "compared",
     "reference",
     "horizon_seconds",

@@ -74,7 +74,7 @@ def certify(
     accuracy_position: float | None = None,
     loads: Sequence[Load] = (),
     known: KnownMotion | None = None,
-    told: TrialProgress | None = None,
+    report: TrialProgress | None = None,
 ) -> Certificate | None:
     """Compare a finished run with an independent solution, as good as the accuracies asked for need (rad; m,
     None if the path need not be compared); None if the run recorded too little to be compared.
@@ -99,7 +99,7 @@ def certify(
     best: Certificate | None = None
     for reference in references(setting, motion, accuracy):
         times, attitudes, places = run_at(_TIMES if reference.has_steps else _WIDE_TIMES)
-        better = finished_trial(experiment, reference, times, loads, told)
+        better = finished_trial(experiment, reference, times, loads, report)
         if better is None:
             continue
         apart = angles_between(attitudes, better.attitudes)

@@ -85,7 +85,7 @@ def chosen(
     *,
     loads: Sequence[Load] = (),
     beyond: Setting | None = None,
-    told: TrialProgress | None = None,
+    report: TrialProgress | None = None,
 ) -> tuple[Experiment, Choice | None]:
     """The experiment with the settings that its ``accuracy`` asks for written into its text, so that it means
     the same run again, and the choice: beyond one that was run and missed the accuracy only more costly ones
@@ -98,7 +98,7 @@ def chosen(
         return experiment, None
     key, _ = asked_of_attitude(experiment) or ("accuracy", accuracy)
     try:
-        choice = choose(experiment, accuracy, loads=loads, beyond=beyond, told=told, key=key)
+        choice = choose(experiment, accuracy, loads=loads, beyond=beyond, report=report, key=key)
     except ConfigError as error:
         raise error.at(experiment.source) from None
     keys = choice.setting.overrides(without=integrator.model_fields_set)
@@ -111,13 +111,13 @@ def choose(
     *,
     loads: Sequence[Load] = (),
     beyond: Setting | None = None,
-    told: TrialProgress | None = None,
+    report: TrialProgress | None = None,
     key: str = "accuracy",
 ) -> Choice:
     """The cheapest setting whose forecast keeps an attitude accuracy (rad, at the end), within what the
     config leaves open. Raises ``ConfigError`` if none does.
     """
-    forecasts = _Forecasts(experiment, accuracy, loads, told)
+    forecasts = _Forecasts(experiment, accuracy, loads, report)
     candidates = sorted(_candidates(experiment, forecasts.motion), key=forecasts.cost)
     most = accuracy / _SAFETY
     optimistic = accuracy * (_OPTIMISTIC_LONG if forecasts.part < 1 else _OPTIMISTIC)
@@ -188,13 +188,13 @@ class _Forecasts:
         experiment: Experiment,
         accuracy: float,
         loads: Sequence[Load],
-        told: TrialProgress | None,
+        report: TrialProgress | None,
     ) -> None:
         self._accuracy, self.motion = accuracy, motion_of(experiment, loads=loads)
         self._samples = build_scene(experiment).samples.count
         self.part = min(1.0, PILOT_STEPS / self.motion.steps)
         times = spread_times(experiment, _TIMES, self.part)
-        self._trial = cache(lambda setting: finished_trial(experiment, setting, times, loads, told))
+        self._trial = cache(lambda setting: finished_trial(experiment, setting, times, loads, report))
         self._measured: dict[Setting, float] = {}
 
     def cost(self, setting: Setting) -> float:

@@ -163,7 +163,7 @@ with 2000 samples of 7500 rotations a quarter of it was missed.
 """
 SIZE, ENERGY = "angular_momentum_norm", "energy"
 SHAPE = "energy over the squared momentum"
-"""It tells the polhode, and is nearer than either."""
+"""It determines the polhode, and is nearer than either."""
 _OF_ROTATION = "rotational_energy"
 """The full model's name for the energy that an averaged one follows, without the potential of gradients."""
 
@@ -397,7 +397,7 @@ def _slope(times: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 # --- what they amount to ------------------------------------------------------------------------------------
 
-_ORBITS = 8  # of the slowest source, from which a growth is told from what goes round with it
+_ORBITS = 8  # of the slowest source, from which a growth is separated from what goes round with it
 _FEWEST_ORBITS = 2
 _ROTATIONS = 4000  # rotations per window, some 20,000 steps
 _MOST_ROTATIONS = 20_000  # for the fewest orbits

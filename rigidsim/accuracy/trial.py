@@ -21,7 +21,7 @@ from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import Check, Progress, SampleReceiver
 from rigidsim.solve.status import Status
 
-_TOLD_EVERY = 0.05  # seconds
+_REPORT_EVERY = 0.05  # seconds
 
 TrialProgress = Callable[[str, float], None]
 """Receives a setting's title and the progress of its trial (0 to 1), some tens of times per second."""
@@ -113,7 +113,7 @@ def try_setting(
     *,
     loads: Sequence[Load] = (),
     go_on: Check = lambda _: None,
-    told: TrialProgress | None = None,
+    report: TrialProgress | None = None,
     compact: bool = False,
     repeating: bool = False,
 ) -> Trial:
@@ -136,9 +136,9 @@ def try_setting(
 
     def check(progress: Progress) -> Status | None:
         nonlocal latest
-        if told is not None and time.monotonic() - latest > _TOLD_EVERY and length:
+        if report is not None and time.monotonic() - latest > _REPORT_EVERY and length:
             latest = time.monotonic()
-            told(setting.title, min(1.0, (progress.time - start) / length))
+            report(setting.title, min(1.0, (progress.time - start) / length))
         return go_on(progress)
 
     found = Collected(prepared, [*recorded, *(f"{name}_drift" for name in invariants)], check)
@@ -158,13 +158,13 @@ def finished_trial(
     setting: Setting,
     times: Sequence[mpmath.mpf],
     loads: Sequence[Load],
-    told: TrialProgress | None,
+    report: TrialProgress | None,
 ) -> Trial | None:
     """A trial in compact code that reached the last of the times (s, mpf); None if the scene can't be
     integrated with the setting (a chart, a load, no closed form), or not so far.
     """
     with suppress(ConfigError):
-        made = try_setting(experiment, setting, times, loads=loads, compact=True, told=told)
+        made = try_setting(experiment, setting, times, loads=loads, compact=True, report=report)
         return made if made.status is Status.FINISHED else None
     return None
 

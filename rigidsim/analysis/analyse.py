@@ -118,7 +118,7 @@ def _with_precession(known: Sequence[Known], raws: Sequence[_Raw], clock: Equidi
     """The known frequencies with the equinox's, unless known: it moves back with the measured precession.
 
     Where an axis follows the node of an orbit, its rate is that node's. Of samples that don't span 1.5
-    turns of the slowest known frequency no precession is told: its rate is partly theirs.
+    turns of the slowest known frequency no precession is reported: its rate is partly theirs.
     """
     names = list(known)
     if not known or any(k.name == "precession" for k in known) or _slow(known, clock):
@@ -202,7 +202,7 @@ def _line(raw: _Raw, clock: EquidistantTimes, known: Sequence[Known], n: int) ->
         off = frequency - combined
         mismatch = float(off - turn * context.nint(off / turn))
         if not name.doubtful:
-            error = max(error, abs(mismatch))  # a blend of lines that are too close to be told apart
+            error = max(error, abs(mismatch))  # a blend of lines that are too close to be separated
     size = abs(complex(amplitude))
     held = at_nyquist(raw.found.sum, real)[n]
     amplitude_error = raw.found.amplitude_errors[n]

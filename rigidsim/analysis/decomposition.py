@@ -23,7 +23,7 @@ from rigidsim.analysis.windows import Spectrum, hann, peak, positions, spectrum
 
 _FALSE_ALARM = 1e-5  # chance that noise alone shows a line
 _SEARCH_ORDERS = (3, 1)  # of the window while lines are looked for; the second where some are close
-_NEAREST = 1.0  # bins between lines that can be told apart
+_NEAREST = 1.0  # bins between lines that can be separated
 _MOST_CANDIDATES = 40  # peaks that may be no lines, before there are none
 # a line CLOSEST / 2 bins from Nyquist's frequency can be 1 / sin(0.3 pi) = 1.24 times the largest sample
 _MOST_OF_SAMPLES = 1.5

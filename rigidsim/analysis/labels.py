@@ -110,7 +110,7 @@ def label(
     """Find the combination that a line represents, observed within +-nyquist, rad/s.
 
     Where nothing fits within the error, combinations within ``blend``, far less than a bin, do: a line can
-    have absorbed others that are too close to be told apart. One whose error is about a bin gets no label.
+    have absorbed others that are too close to be separated. One whose error is about a bin gets no label.
     Where chance would fit as many combinations of all that is known, those of the frequencies below Nyquist's
     are tried alone.
     """
@@ -178,7 +178,7 @@ def _fitting(
             and (c <= cost[0] + _RIVALS if turns[n] != turns[best] else c == cost[0] and not blended)
         ]
         others = tuple(named(vectors[n].tolist(), known) for n in rivals[:4])
-        # which of several frequencies it is can't be told
+        # which of several frequencies it is stays open
         folds = 0 if any(turns[n] != turns[best] for n in rivals) else int(turns[best])
         multipliers = tuple(vectors[best].tolist())
         return Label(multipliers, named(multipliers, known), folds, others)

@@ -89,7 +89,7 @@ def settled(samples: SignalSamples, total: Sum, order: int) -> Sum:
 
 
 def at_nyquist(total: Sum, real: bool) -> list[bool]:
-    """Which lines stand for what is too near Nyquist's frequency to be told from its own mirror image.
+    """Which lines stand for what is too near Nyquist's frequency to be separated from its mirror image.
 
     There a real signal only shows the line's amplitude times the cosine of its phase.
     """

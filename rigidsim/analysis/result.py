@@ -77,7 +77,7 @@ class SignalAnalysis:
         value, rate: secular part in the middle of the samples, and its rate per s; None without one.
         order, spectrum: order of the Hann window; frequencies (rad/s) and sizes, for a picture.
         left, level: rms of the remainder; amplitude below which lines aren't seen.
-        close: frequencies (rad/s) where something is left that is too close to a line to be told apart.
+        close: frequencies (rad/s) where something is left that is too close to a line to be separated.
         exhausted: whether there are more lines than were asked for.
     """
 
@@ -234,8 +234,8 @@ def _dataset(analysis: Analysis) -> xarray.Dataset:
     longest = max((len(s.lines) for s in signals), default=0)
     data: dict[str, tuple[Any, ...]] = {}
 
-    def put(name: str, dims: tuple[str, ...], values: Any, dtype: Any = np.float64, **told: str) -> None:
-        data[name] = (dims, np.array(values, dtype=dtype), told)
+    def put(name: str, dims: tuple[str, ...], values: Any, dtype: Any = np.float64, **attrs: str) -> None:
+        data[name] = (dims, np.array(values, dtype=dtype), attrs)
 
     def table(
         name: str, units: str, words: str, of: Any, dtype: Any = np.float64, fill: Any = np.nan

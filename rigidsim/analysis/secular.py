@@ -18,7 +18,7 @@ _NEAR = 30.0  # bins from zero within which lines may be pieces of the slow part
 _PIECE = 0.1  # of what is left, above which a line is one of its own; pieces were 1e-4 to 3e-2
 _SURE = 4.0  # standard deviations above which something is there
 _CELLS = 4096
-_STRAIGHT = 1e-3  # k, in half lengths, below which exponentials can't be told from polynomials by rounding
+_STRAIGHT = 1e-3  # k, in half lengths, below which rounding hides how exponentials differ from polynomials
 _BENT = 1e-2  # k of an exponential that changes by a tenth of its logarithm in half the length
 _LONGEST = 3.0  # half lengths that a slow part may take to change by e, where the samples don't say
 

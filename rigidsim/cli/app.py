@@ -356,7 +356,7 @@ def view(
     """
 
 
-_EACH_FIGURE = "\n".join(f"{name:17}{told}" for name, told in FIGURES.items())
+_EACH_FIGURE = "\n".join(f"{name:17}{description}" for name, description in FIGURES.items())
 
 
 @_command("results", f"\n\n\b\nFigures:\n{_EACH_FIGURE}")

@@ -24,8 +24,8 @@ _NAMES: dict[str, Iterable[str]] = {
 
 def scenes(incomplete: str) -> list[tuple[str, str]]:
     """Scenes of ``rigidsim new`` and their other names, with descriptions."""
-    told = described()
-    known = {**told, **{alias: told[name] for alias, name in ALIASES.items()}}
+    descriptions = described()
+    known = {**descriptions, **{alias: descriptions[name] for alias, name in ALIASES.items()}}
     return [(name, text) for name, text in known.items() if name.startswith(incomplete)]
 
 

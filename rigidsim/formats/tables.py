@@ -396,7 +396,7 @@ def write_zarr(table: Table, path: Path, source: TableSource) -> None:
     rest = [name for name in dataset.variables if dim not in dataset[name].dims]
     last = _plain(dataset[rest], source)
     last.attrs = attributes
-    if members:  # no variable that is written beside a vector's components tells that they are a coordinate
+    if members:  # no variable written with a vector's components says that they are a coordinate
         last = last.reset_coords()
         beside = [str(name) for name in dataset.coords if name not in dataset.dims]
         last.attrs = attributes | ({"coordinates": " ".join(beside)} if beside else {})

@@ -21,11 +21,11 @@ _TURN = 2 * np.pi
 _ROUND = 1e-6  # relative difference of two moments, below which a body is symmetric
 _STILL = 1e-9  # of an angle's growth, below which what is left of it is rounding
 _VISIBLE = 0.01  # of its start, from which a change is seen on an axis from zero
-_QUICK = np.deg2rad(1.0)  # a day, from which a node's motion is told in the axis' own unit
+_QUICK = np.deg2rad(1.0)  # a day, from which a node's motion is shown in the axis' own unit
 _LEGIBLE = 0.01  # of an angle, from which the ticks along its swing need four digits at most
 _AS_FAR = 0.7  # of the whole swing: what a straight line must leave of it to be of no help
 _STEEP = 1.5  # rad of pitch, near which roll and yaw are ill-defined
-_ROUNDING = 1e-11  # of rates, below which their difference tells nothing
+_ROUNDING = 1e-11  # of rates, below which their difference is rounding
 _DECADES = 3.0  # by which a rate falls, from which its axis is logarithmic
 _LOOPS, _WINDOW = 3, 8  # of a long fast path that are shown bright; times as many, that a plot shows
 _AXES = {"figure": "blue", "spin": "orange", "momentum": "violet"}
@@ -101,12 +101,12 @@ def orientations(dataset: xarray.Dataset) -> dict[str, tuple[Array, Array]]:
     first, (tilt, node) = next(iter(known.items()))
     reach = max(float(np.nanmax(np.abs(tilt - np.nanmean(tilt)))), 1e-300)
 
-    def told_apart(pair: tuple[Array, Array]) -> bool:
+    def distinct(pair: tuple[Array, Array]) -> bool:
         longitude = pair[1] - node  # of half a turn and more: it goes about another pole
         near = float(np.nanmax(longitude) - np.nanmin(longitude)) < np.pi
         return float(np.nanmax(np.abs(pair[0] - tilt))) > 0.03 * reach and near
 
-    return {name: pair for name, pair in known.items() if name == first or told_apart(pair)}
+    return {name: pair for name, pair in known.items() if name == first or distinct(pair)}
 
 
 def precesses(dataset: xarray.Dataset) -> bool:
@@ -153,7 +153,7 @@ def longitude(dataset: xarray.Dataset) -> Plot | None:
     if not _legible(table) or np.nanmax(rest) - np.nanmin(rest) < _AS_FAR * (
         np.nanmax(table) - np.nanmin(table)
     ):
-        # precession is told by the year, whatever the axis of time is in
+        # precession is shown by the year, whatever the axis of time is in
         per = unit if abs(trend.rate) * DAY > _QUICK else named_unit("yr")
         rate = f"{trend.about}{angle_text(trend.rate * per.seconds, 3)}/{per.symbol}"
         table, title, word = rest, f"{title} less its mean motion, {rate}", "longitude − line"
@@ -415,9 +415,9 @@ def sensitivity(variable: str, moved: str) -> Curve:
         attributes = dataset[variable].attrs
         keys = [str(label) for label in dataset["parameter"].values]
         units = str(attributes.get("parameter_units", "")).split(", ") + [""] * len(keys)
-        told = [k if unit in ("1", "") else f"{k} [{unit}]" for k, unit in zip(keys, units, strict=False)]
+        titles = [k if unit in ("1", "") else f"{k} [{unit}]" for k, unit in zip(keys, units, strict=False)]
         size = np.linalg.norm(table, axis=2)
-        labels = [k if (s > 0).any() else f"{k}: 0 throughout" for k, s in zip(told, size.T, strict=True)]
+        labels = [k if (s > 0).any() else f"{k}: 0 throughout" for k, s in zip(titles, size.T, strict=True)]
         unit = str(attributes.get("units", "1")).replace("rad s-1", "rad/s")
         title = f"How far the {moved}, per SI unit of"
         return Plot(variable, title, size, labels, f"{unit} per unit", word="size", log=True)

@@ -31,12 +31,12 @@ class NoGraphics(RuntimeError):
 
 
 def render(
-    path: Path, target: Path, *, seconds: float = SECONDS, told: Callable[[int, int], None] | None = None,
+    path: Path, target: Path, *, seconds: float = SECONDS, progress: Callable[[int, int], None] | None = None,
     at: float = PICTURED_AT, size: tuple[int, int] = SIZE,
 ) -> Path:  # fmt: skip
     """Draw a recording (``.rrd``) as a PNG picture at a fraction of the run, or a GIF or MP4 film of all of
-    it lasting so many seconds, as the suffix of `target` says, which it returns; `told` is given the numbers
-    of frames drawn and in all. ``size``: of the picture, points.
+    it lasting so many seconds, as the suffix of `target` says, which it returns; `progress` receives the
+    numbers of frames drawn and in all. ``size``: of the picture, points.
 
     Raises:
     ValueError: another suffix.
@@ -53,7 +53,7 @@ def render(
             _without_bar(viewer.settled_picture()).save(target)
             return target
         rate = FRAMES_PER_SECOND[suffix]
-        frames = _frames(viewer, max(round(seconds * rate), 2), told)
+        frames = _frames(viewer, max(round(seconds * rate), 2), progress)
         if encoder is None:
             _write_gif(target, frames, rate)
         else:
@@ -62,15 +62,15 @@ def render(
 
 
 def _frames(
-    viewer: HeadlessViewer, count: int, told: Callable[[int, int], None] | None
+    viewer: HeadlessViewer, count: int, progress: Callable[[int, int], None] | None
 ) -> Iterator[Image.Image]:
     viewer.seek(0.0)
     viewer.settled_picture(5.0)  # the plots are read by then, and the opening notes have gone
     for number in range(count):
         viewer.seek(number / (count - 1))
         yield _without_bar(viewer.picture())
-        if told is not None:
-            told(number + 1, count)
+        if progress is not None:
+            progress(number + 1, count)
 
 
 def _without_bar(picture: bytes) -> Image.Image:

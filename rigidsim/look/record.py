@@ -142,13 +142,13 @@ def _of_version_1_0(dataset: xarray.Dataset) -> dict[str, Any]:
             return None
 
     config = read_config(dataset)
-    frame, told = config.get("frame", {}), listed("surroundings") or []
+    frame, recorded = config.get("frame", {}), listed("surroundings") or []
     axis, normal = frame.get("figure_axis"), frame.get("reference")
-    for one in told:  # of a version in between
+    for one in recorded:  # of a version in between
         if one["what"] == "frame":
             axis, normal = one["figure_axis"], normal and (one["reference_normal"] or "moving")
     numbers = isinstance(normal, list) and all(isinstance(x, float | int) for x in normal)
-    pull = next((one["acceleration"] for one in told if one["what"] == "gravity"), None)
+    pull = next((one["acceleration"] for one in recorded if one["what"] == "gravity"), None)
     return {
         "moments": listed("principal_moments"),
         "axes": listed("principal_axes"),
@@ -163,7 +163,7 @@ def _of_version_1_0(dataset: xarray.Dataset) -> dict[str, Any]:
         ),
         "space_axes": dataset.attrs.get("axes"),
         "gravity": pull,
-        "objects": told,
+        "objects": recorded,
     }
 
 
@@ -176,7 +176,7 @@ def read_config(dataset: xarray.Dataset) -> dict[str, Any]:
 
 
 def body_of(one: dict[str, Any]) -> KnownBody | None:
-    """The known body with the gravitational parameter of what was told; None if it is no known one."""
+    """The known body with the gravitational parameter of a recorded object; None if it is no known one."""
     return known_body(float(one.get("gravitational_parameter") or 0.0))
 
 

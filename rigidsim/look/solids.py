@@ -286,7 +286,7 @@ def sharp_edges(mesh: Mesh) -> Array:
     corners = mesh.vertices[mesh.triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    # No vertices are shared: those at one place are told by their rounded coordinates.
+    # No vertices are shared: rounded coordinates identify those at one place.
     keys = np.round(corners.reshape(-1, 3) / mesh.reach() * 1e6).astype(np.int64)
     _, names = np.unique(keys, axis=0, return_inverse=True)
     names = names.reshape(-1, 3)

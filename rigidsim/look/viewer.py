@@ -55,7 +55,7 @@ def follow(read: Callable[[], tuple[xarray.Dataset | None, bool]], *, web: bool 
     """
     port = free_port()
     with _running([], port, ["--port", str(port), "--expect-data-soon"], web=web) as process:
-        # Ctrl-C ends the viewer, too: what was on its way there would be complained of, and `process` tells
+        # Ctrl-C ends the viewer, too: what was on its way there would be complained of, and `process` reports
         # enough. rerun looks at this when it is loaded
         os.environ.setdefault("RUST_LOG", "off")
         from rigidsim.look.timeline.writing import live_recording

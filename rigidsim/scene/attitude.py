@@ -19,17 +19,17 @@ def _within(context: Any) -> Rotations:
     tiny = context.mpf(2) ** (8 - context.prec)
 
     def sine(angle: Any) -> Any:
-        return _beside(context.sin(angle), [angle])
+        return _without_rounding(context.sin(angle), [angle])
 
     def cosine(angle: Any) -> Any:
-        return _beside(context.cos(angle), [angle])
+        return _without_rounding(context.cos(angle), [angle])
 
     functions = sine, cosine, context.atan2, context.hypot
     is_tiny = lambda length: bool(length < tiny)  # noqa: E731
     return Rotations(*functions, constant=context.mpf, negligible=is_tiny, total=_total)
 
 
-def _beside(value: Any, terms: Sequence[Any]) -> Any:
+def _without_rounding(value: Any, terms: Sequence[Any]) -> Any:
     """The value, or zero if it is the rounding of its terms; floats and arrays, without guard bits, stay."""
     context = getattr(getattr(value, "graph", value), "context", None)  # a traced number's is its graph's
     if context is None or context.prec < GUARD_BITS:
@@ -39,7 +39,7 @@ def _beside(value: Any, terms: Sequence[Any]) -> Any:
 
 
 def _total(terms: Sequence[Any]) -> Any:
-    return _beside(rotations.from_left(terms), terms)
+    return _without_rounding(rotations.from_left(terms), terms)
 
 
 def product(p: Sequence[Any], q: Sequence[Any]) -> Vector:
@@ -52,7 +52,7 @@ def rotation_matrix(q: Vector) -> Matrix:
     w, x, y, z = q
     pairs = {(0, 1): (x * y, w * z), (0, 2): (x * z, w * y), (1, 2): (y * z, w * x)}
     return [
-        [_beside(r, pairs[min(i, j), max(i, j)] if i != j else (1.0,)) for j, r in enumerate(row)]
+        [_without_rounding(r, pairs[min(i, j), max(i, j)] if i != j else (1.0,)) for j, r in enumerate(row)]
         for i, row in enumerate(rotations.rotation_matrix(q))
     ]
 

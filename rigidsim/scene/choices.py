@@ -23,14 +23,14 @@ class Method:
     Attributes:
         name: as in configs, summaries and datasets.
         title: name in sentences and tables.
-        told: what it is, for the description of the key.
+        described: what it is, for the description of the key.
         has_steps: whether it integrates any equations step by step. One without steps gives the states at
             any time from a solution that is known, and has no tolerance.
     """
 
     name: str
     title: str
-    told: str
+    described: str
     has_steps: bool = True
 
 
@@ -64,18 +64,18 @@ class Variables:
 
     Attributes:
         name: as in configs, summaries and datasets.
-        told: what they are, for the description of the key; empty if the name says it.
+        described: what they are, for the description of the key; empty if the name says it.
         keeps_attitude: whether the attitude follows from them.
         general: whether they describe any motion's attitude, so that settings can be compared in them.
         regular: whether they have no singularity that a motion may come near. Neighbours of a motion in
             others, and what happens between its samples, are followed in quaternions.
         in_closed_form: whether closed forms give them.
         checked_by: variables that round otherwise, with which their errors are checked.
-        caveat: what a motion in them can't show, told with the results.
+        caveat: what a motion in them can't show, reported with the results.
     """
 
     name: str
-    told: str = ""
+    described: str = ""
     keeps_attitude: bool = True
     general: bool = True
     regular: bool = True

@@ -70,8 +70,8 @@ def _key(node: Mapping[str, Any]) -> dict[str, Any]:
         (unit,) = units
         key["x-unit"] = unit
         if unit != "1":
-            told = f"[{unit}]" if unit else "[SI, or any unit]"
-            key["description"] = f"{key.get('description', '')} {told}".strip()
+            shown = f"[{unit}]" if unit else "[SI, or any unit]"
+            key["description"] = f"{key.get('description', '')} {shown}".strip()
     _bounded(key)
     if "default" in key:
         key["default"] = as_written(key["default"])

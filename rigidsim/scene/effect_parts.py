@@ -9,7 +9,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class EffectPart:
-    """Part of what a load does, told by ``SceneLoad.effect_parts``.
+    """Part of what a load does, from ``SceneLoad.effect_parts``.
 
     Attributes:
         name: short; after the load's own name, its code.

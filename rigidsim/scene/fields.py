@@ -109,7 +109,7 @@ NAME_OR_VECTOR = ("as a name", "as a vector")
 
 
 def name_or_vector(allowed: str) -> Discriminator:
-    """What tells such alternatives apart, and anything else as not ``allowed``."""
+    """Distinguishes such alternatives; anything else isn't ``allowed``."""
 
     def kind(value: Any) -> str | None:
         if isinstance(value, str):
@@ -320,7 +320,7 @@ class OneOf:
 
 
 def named(pattern: str, allowed: str) -> AfterValidator:
-    """A validator of names of a pattern, told as what is ``allowed``."""
+    """A validator of names of a pattern; its error says what is ``allowed``."""
 
     def validate(value: str) -> str:
         if not re.fullmatch(pattern, value):

@@ -48,12 +48,12 @@ class Integrator(ConfigTable):
     formulation: Annotated[str, OneOf(FORMULATIONS, (AUTO,))] = Field(
         AUTO,
         description="the variables that are integrated; "
-        + "; ".join(f"{name}: {known.told}" for name, known in FORMULATIONS.items() if known.told),
+        + "; ".join(f"{name}: {known.described}" for name, known in FORMULATIONS.items() if known.described),
     )
     euler_sequence: EulerSequence = "zxz"
     """axes of the intrinsic rotations, for [initial] and for recorded angles"""
     method: Annotated[str, OneOf(METHODS)] = Field(
-        DEFAULT_METHOD, description="; ".join(f"{method.name}: {method.told}" for method in METHODS.values())
+        DEFAULT_METHOD, description="; ".join(f"{x.name}: {x.described}" for x in METHODS.values())
     )
     hold_invariants: StrictBool | Literal["auto"] = "auto"
     """project the state onto its invariants, so that errors of long runs grow far more slowly; auto: from

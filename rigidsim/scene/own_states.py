@@ -74,7 +74,7 @@ class OwnState:
     why: str = ""
 
     @property
-    def told(self) -> str:
+    def described(self) -> str:
         """What it is, in a reader's terms."""
         start = f"{float(self.initial):.4g}" + ("" if self.unit in (None, "1") else f" {self.unit}")
         return f'state {self.name}: from {start}, changes by "{self.derivative.text}"'

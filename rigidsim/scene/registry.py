@@ -24,7 +24,7 @@ from rigidsim.scene.expressions.tree import Expression, ExpressionError
 from rigidsim.scene.fields import ConfigTable, Metre, Positive, VariableName
 from rigidsim.scene.frame import Figure
 from rigidsim.scene.kernels.ephemeris import Ephemeris
-from rigidsim.scene.kernels.reading import Sight
+from rigidsim.scene.kernels.reading import RelativeEphemeris
 from rigidsim.scene.point_masses import PointMasses
 
 
@@ -150,7 +150,7 @@ class SceneLoad:
     bearing: tuple[Any, Vector] | None = None
     apart: Matrix | None = None
     inner_momentum: Vector | None = None
-    sights: tuple[tuple[Sight, int], ...] = ()
+    sights: tuple[tuple[RelativeEphemeris, int], ...] = ()
     nothing: ClassVar[Mapping[str, Any]] = {}
 
     @classmethod

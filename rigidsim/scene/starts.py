@@ -41,7 +41,7 @@ class InitialRotation:
         quaternion: unit quaternion, body to space.
         angular_velocity: body axes, rad/s; None from a way that gives the attitude alone.
         euler_angles: as given, rad; None if given otherwise.
-        found: how an equilibrium was found, for who tells it; None for a start that was given.
+        found: how an equilibrium was found, for reports; None for a start that was given.
     """
 
     quaternion: Vector

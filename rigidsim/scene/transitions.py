@@ -6,7 +6,7 @@ happens where the function's argument is of order one, and the argument itself i
 ``rigidsim.model.step_limiter``. A root of something that touches zero, such as a vanishing norm, likewise
 continues smoothly along the wrong branch.
 
-What happens abruptly at a time has to be known to more digits than one number holds: a double tells times
+What happens abruptly at a time has to be known to more digits than one number holds: a double gives times
 around 5000 s to 1e-12 s, and a pulse between times rounded so, or a spike whose argument (t - 5000.3)/0.01 is
 worked out from such a time, gives another impulse than the one that was written.
 """

@@ -76,7 +76,7 @@ def config_error(
     for item in islice(error.errors(include_url=False), _MOST_PROBLEMS):
         # the alternatives of a union each report; their names are no part of the user's key
         path, given = Path(_of_the_user(item["loc"], alternatives)), item["input"]
-        if item["type"].startswith("union_tag"):  # a table told apart by its kind: the key at fault is kind
+        if item["type"].startswith("union_tag"):  # kind chooses among tables: kind is the key at fault
             path, given = path / "kind", given.get("kind") if isinstance(given, Mapping) else None
         allowed = partial(path.parent.keys, model, tables)
         what = _what(allowed, {**item, "loc": path.steps, "input": given})

@@ -301,7 +301,7 @@ def _known(attributes: dict[str, Any]) -> dict[str, Any]:
 
 
 def kernel_attributes(scene: Scene) -> dict[str, Any]:
-    """What tells the kernels of a scene: names, span of what was read, and SHA-256; empty without one."""
+    """Identifies the kernels of a scene: names, span of what was read, and SHA-256; empty without one."""
     return _of_ephemeris(scene) | _of_orientation(scene)
 
 

@@ -63,18 +63,18 @@ class Dates:
     @property
     def variables(self) -> list[Variable]:
         """The variables ``year`` and ``julian_date``, and ``date`` if every sample has one."""
-        told = {"time_scale": self.scale}
+        scale = {"time_scale": self.scale}
         found = [
             Variable(
                 "year",
                 (),
-                {"units": "julian_year", "long_name": f"Julian year, {self.scale}", **told}
+                {"units": "julian_year", "long_name": f"Julian year, {self.scale}", **scale}
                 | {"definition": "2000 + (julian_date - 2451545) / 365.25"},
             ),
             Variable(
                 "julian_date",
                 (),
-                {"units": "d", "long_name": f"Julian date, {self.scale}", **told, "significant_bits": 106},
+                {"units": "d", "long_name": f"Julian date, {self.scale}", **scale, "significant_bits": 106},
                 2,
             ),
         ]

@@ -34,7 +34,7 @@ from rigidsim.session.session import (
     SampleStatistics,
     Session,
 )
-from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, time_words, told_loads
+from rigidsim.session.understood import body_of, cautions_of, load_descriptions, span_of, start_of, time_words
 from rigidsim.solve.assembly import Assembly, assemble
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.effects.charts import Charts
@@ -104,8 +104,8 @@ class Diagnostics:
         """
         progress, beside = self.progress, ""
         if self.prepared.algorithm.own_errors:
-            told = own()
-            return self if told is None else replace(self, estimate=Estimate(**vars(told)))
+            errors = own()
+            return self if errors is None else replace(self, estimate=Estimate(**vars(errors)))
         if corrected is not None:
             acting = [one.registered for one in corrected.effects if one.registered and not one.rewrites]
             if acting:  # which a closed form knows nothing of
@@ -378,7 +378,7 @@ def time_reached(prepared: InitialValueProblem, progress: Progress, log: EventLo
     return float(clock.labels(done - 1, done)[0]) if done else clock.seconds(clock.start)
 
 
-def closing_words(prepared: InitialValueProblem, progress: Progress, parts: Assembly) -> str:
+def status_message(prepared: InitialValueProblem, progress: Progress, parts: Assembly) -> str:
     """The status in words: which event ended the run and when, or where and why it broke down."""
     log = parts.log
     text, words = progress.status.message, time_words(prepared.scene)
@@ -446,7 +446,7 @@ def summarise(run: "_ActiveRun", found: Diagnostics, spectrum: LyapunovSpectrum 
         name=scene.name,
         description=scene.description,
         status=progress.status.value,
-        message=closing_words(prepared, progress, run.parts),
+        message=status_message(prepared, progress, run.parts),
         exit_code=progress.status.exit_code,
         **as_fields([*run.session.remarks, *cautions_of(scene), *found.cautions()]),
         samples=progress.next_sample,
@@ -470,7 +470,7 @@ def summarise(run: "_ActiveRun", found: Diagnostics, spectrum: LyapunovSpectrum 
         body=body_of(scene),
         start=start_of(scene),
         time=span_of(scene),
-        loads=told_loads(prepared, sizes=False),
+        loads=load_descriptions(prepared, sizes=False),
         bit_for_bit=_bit_for_bit(prepared, progress, run.attributes.get("mixed_provenance")),
         provenance=repeated(run.attributes),
         events={c.name: len(log.occurrences(i, run.last_time)) for i, c in enumerate(system.events)},
@@ -702,7 +702,7 @@ class _ActiveRun:
         return spectrum
 
     def diagnosed(self) -> Diagnostics:
-        """What the run tells of itself: drifts, and its errors if they are to be estimated."""
+        """The run's own diagnostics: drifts, and its errors if they are to be estimated."""
         prepared, session, parts = self.prepared, self.session, self.parts
         found = Diagnostics(prepared, self.progress, self.recorder.statistics)
         if not prepared.scene.config.output.estimate or not self.progress.status.final:

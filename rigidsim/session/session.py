@@ -470,7 +470,7 @@ class RunCost:
 
 @dataclass
 class Session:
-    """The work of one process on a run: all of it, or what was left. ``mixed`` tells what changed in versions
+    """The work of one process on a run: all of it, or what was left. ``mixed`` says what changed in versions
     or machine since the run began.
     """
 

@@ -77,7 +77,7 @@ def span_of(scene: Scene) -> Span:
     )
 
 
-def told_loads(prepared: InitialValueProblem, *, sizes: bool = True) -> tuple[str, ...]:
+def load_descriptions(prepared: InitialValueProblem, *, sizes: bool = True) -> tuple[str, ...]:
     """The loads and user-defined states, one sentence for each: keys, and torque and force at the start.
 
     Args:
@@ -105,7 +105,7 @@ def told_loads(prepared: InitialValueProblem, *, sizes: bool = True) -> tuple[st
         acting = [f"{kind} {number_text(size, _DIGITS)} {unit}" for kind, size, unit in effects[number]]
         if at_start := [*_seen(place, scene), *acting]:
             said[-1] += f"; at the start {', '.join(at_start)}"
-    return (*said, *(state.told for state in scene.states))
+    return (*said, *(state.described for state in scene.states))
 
 
 def _seen(place: Vector, scene: Scene) -> Iterator[str]:

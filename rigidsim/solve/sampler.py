@@ -43,7 +43,7 @@ Check = Callable[[Progress], Status | None]
 
 
 class SampleReceiver(Protocol):
-    """Receives samples in order, and is told when they can be saved; the base class never asks for that.
+    """Receives samples in order, and hears when they can be saved; the base class never asks for that.
 
     Attributes:
         last_wanted: index of a sample that ends the run by the guard ``max_drift``; later ones weren't taken.

@@ -6,7 +6,7 @@ turns by at most ``DENSE`` there: distant samples have rows between them, found 
 like samples but not recorded, and like samples they change no bit of the motion.
 
 Near a pole both outer Euler angles swing by up to half a turn at once, in opposite senses, while a + s c
-(``rigidsim.model.euler_poles``) advances no faster than the body turns. So its change tells the turns of c
+(``rigidsim.model.euler_poles``) advances no faster than the body turns. So its change gives the turns of c
 once those of a are chosen; chosen one by one, they may add up to a turn that nobody made. Where an angle
 jumps by nearly half a turn all the same, the motion between the two rows is integrated once more, in double
 precision, and looked at in ever smaller parts. Of a pass nearer than that resolves the nearest way is taken.
@@ -63,7 +63,7 @@ def radians_between_samples(system: System) -> float:
     """
     scene, rate = system.scene, float(system.rate_bound)
     if not system.formulation.resolves_rotation:
-        # the plane may move, but nothing is told of the place on an orbit
+        # the plane may move, but no place on an orbit is recorded
         rate += float(plane_drift(scene, system.plan.loads) or 0)
     elif any(r.name != "euler_angles" for r in angles_to_join(system)):
         rate += float(source_rate(scene))

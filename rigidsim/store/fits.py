@@ -1,4 +1,4 @@
-"""Whether a folder is a fit's, told without loading what makes fits."""
+"""Whether a folder is a fit's, found without loading what makes fits."""
 
 from pathlib import Path
 

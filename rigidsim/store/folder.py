@@ -82,7 +82,7 @@ class WorkFolder:
 
     @property
     def at_work(self) -> bool:
-        """Whether a process is at work here, as far as can be told."""
+        """Whether a process is at work here, as far as can be seen."""
         try:
             descriptor = os.open(self.path, os.O_RDONLY)
         except OSError:
@@ -195,7 +195,7 @@ class RunFolder(WorkFolder):
 
     @property
     def read_only(self) -> OSError | None:
-        """Why the folder can't be written, as far as can be told without trying; None if it can."""
+        """Why the folder can't be written, as far as can be seen without trying; None if it can."""
         for place in (self.path, self.segments):
             if not place.is_dir() or _may_write(place):
                 continue

@@ -22,19 +22,19 @@ _SIZES = {"page": film.SIZE, "scene": (1600, 800), "plots": (900, 900)}
 _GIF_SIZES = {"page": (1000, 600), "scene": (720, 420), "plots": (640, 640)}
 """Points of pictures and MP4 films, and of GIF films, by the part of the page that they show."""
 
-Told = Callable[[int, int], None]
+FrameProgress = Callable[[int, int], None]
 
 
 def draw(
-    dataset: xarray.Dataset, target: Path, *, seconds: float | None = None, told: Told | None = None,
-    at: str | None = None, part: str = "page",
+    dataset: xarray.Dataset, target: Path, *, seconds: float | None = None,
+    progress: FrameProgress | None = None, at: str | None = None, part: str = "page",
 ) -> None:  # fmt: skip
     """Draw a run to a PNG picture, or a GIF or MP4 film, without the viewer's own bars.
 
     Args:
         dataset: of the run, possibly lazy.
         seconds: that a film lasts.
-        told: is given the numbers of frames drawn and in all.
+        progress: receives the numbers of frames drawn and in all.
         at: moment of a picture: a number in the scene's unit of time, or with its own (``"2.4 hr"``).
         part: of the page, one of ``PARTS``.
 
@@ -53,17 +53,17 @@ def draw(
             write_timeline(dataset, recording, part=part, height=size[1])
         except (OSError, RuntimeError, ValueError) as error:
             raise RunFolderError(f"{target}: can't be drawn: {error}") from None
-        draw_recording(recording, target, seconds=seconds, told=told, at=share, size=size)
+        draw_recording(recording, target, seconds=seconds, progress=progress, at=share, size=size)
 
 
 def draw_recording(
-    recording: Path, target: Path, *, seconds: float | None = None, told: Told | None = None,
+    recording: Path, target: Path, *, seconds: float | None = None, progress: FrameProgress | None = None,
     at: float = film.PICTURED_AT, size: tuple[int, int] = film.SIZE,
 ) -> None:  # fmt: skip
     """Draw a recording at a fraction of the run, or a film of it; see ``draw``."""
     with _new(target) as new:
         try:
-            film.render(recording, new, seconds=seconds or film.SECONDS, told=told, at=at, size=size)
+            film.render(recording, new, seconds=seconds or film.SECONDS, progress=progress, at=at, size=size)
         except (FileNotFoundError, RuntimeError, ValueError) as error:
             raise RunFolderError(f"{target}: can't be drawn: {error}") from None
 

@@ -20,7 +20,7 @@ from rigidsim.store import netcdf
 
 
 def cpu_model() -> str:
-    """The processor's name, from the kernel if it tells."""
+    """The processor's name, from the operating system's kernel if known."""
     try:
         for line in Path("/proc/cpuinfo").read_text().splitlines():
             if line.startswith("model name"):

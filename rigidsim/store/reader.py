@@ -93,8 +93,8 @@ def in_memory(
         dim: xarray.Variable(dim, np.array(labels, str), label_attributes(dim))
         for dim, labels in used_labels(variables).items()
     }
-    for name, dims, values, told in parts:
-        content[name] = xarray.Variable(dims, values, _as_read(told), {"dtype": values.dtype})
+    for name, dims, values, recorded in parts:
+        content[name] = xarray.Variable(dims, values, _as_read(recorded), {"dtype": values.dtype})
     return xarray.decode_cf(xarray.Dataset(content, attrs=_as_read(attributes))).load()
 
 

@@ -32,10 +32,10 @@ Four = tuple[FiniteNumber, FiniteNumber, FiniteNumber, FiniteNumber]
 
 
 @dataclass(frozen=True)
-class Claim:
+class Reproducible:
     """Marks a field that follows from the config alone, so that running it again must confirm it.
 
-    ``of_end``: whether it tells how the run ended, which an interruption changes.
+    ``of_end``: whether it says how the run ended, which an interruption changes.
     """
 
     of_end: bool = False
@@ -96,7 +96,7 @@ class Cost(SummaryPart):
         smallest_step, largest_step: seconds; None if no step was taken, or none was finite.
     """
 
-    steps: Annotated[StrictInt, Claim()]
+    steps: Annotated[StrictInt, Reproducible()]
     steps_redone: StrictInt
     smallest_step: FiniteNumber | None
     largest_step: FiniteNumber | None
@@ -124,16 +124,16 @@ class InvariantDrift(SummaryPart):
         put_back: for a projected invariant, the drift that would have been.
     """
 
-    initial: Annotated[FiniteNumber | tuple[FiniteNumber, ...] | None, Claim()]
-    units: Annotated[Text, Claim()]
-    scale: Annotated[FiniteNumber, Claim()]
-    scale_name: Annotated[Text, Claim()]
-    largest_drift: Annotated[FiniteNumber | None, Claim()]
-    final_drift: Annotated[FiniteNumber | None, Claim()]
-    bound: Annotated[FiniteNumber, Claim()]
-    put_back: Annotated[FiniteNumber | None, Claim()] = None
-    why: Annotated[Text, Claim()]
-    numerical: Annotated[StrictBool, Claim()]
+    initial: Annotated[FiniteNumber | tuple[FiniteNumber, ...] | None, Reproducible()]
+    units: Annotated[Text, Reproducible()]
+    scale: Annotated[FiniteNumber, Reproducible()]
+    scale_name: Annotated[Text, Reproducible()]
+    largest_drift: Annotated[FiniteNumber | None, Reproducible()]
+    final_drift: Annotated[FiniteNumber | None, Reproducible()]
+    bound: Annotated[FiniteNumber, Reproducible()]
+    put_back: Annotated[FiniteNumber | None, Reproducible()] = None
+    why: Annotated[Text, Reproducible()]
+    numerical: Annotated[StrictBool, Reproducible()]
 
 
 class Accuracy(SummaryPart):
@@ -218,8 +218,8 @@ class Modelling(SummaryPart):
         unmeasured: an ``UnmeasuredCode``, why it wasn't found; empty where it was.
     """
 
-    level: Annotated[Text, Claim()]
-    short_period: Annotated[StrictBool, Claim()]
+    level: Annotated[Text, Reproducible()]
+    short_period: Annotated[StrictBool, Reproducible()]
     resonance: Text = ""
     momentum_axis: FiniteNumber | None = None
     figure_axis: FiniteNumber | None = None
@@ -228,7 +228,7 @@ class Modelling(SummaryPart):
     growth: FiniteNumber | None = None
     oscillation: FiniteNumber | None = None
     whole: StrictBool = False
-    requested: Annotated[FiniteNumber | None, Claim()] = None
+    requested: Annotated[FiniteNumber | None, Reproducible()] = None
     how: Text = ""
     unmeasured: Text = ""
     cpu_seconds: FiniteNumber | None = None
@@ -244,12 +244,12 @@ class Modelling(SummaryPart):
 class Lyapunov(SummaryPart):
     """The motion's Lyapunov spectrum, 1/s, and what it implies for the run's digits."""
 
-    chaotic: Annotated[StrictBool, Claim()]
-    largest_exponent: Annotated[FiniteNumber, Claim()]
-    moved_over_second_half: Annotated[FiniteNumber, Claim()]
+    chaotic: Annotated[StrictBool, Reproducible()]
+    largest_exponent: Annotated[FiniteNumber, Reproducible()]
+    moved_over_second_half: Annotated[FiniteNumber, Reproducible()]
     e_folding_seconds: FiniteNumber | None = None
     predictable_seconds: FiniteNumber | None = None
-    exponents: Annotated[tuple[FiniteNumber, ...], Claim()] = ()
+    exponents: Annotated[tuple[FiniteNumber, ...], Reproducible()] = ()
     states: tuple[Text, ...] = ()
     units: Text = "s-1"
 
@@ -258,9 +258,9 @@ class EventTimes(SummaryPart):
     """Times at which an event happened, s: the first, at most ``EARLY`` of the first ones, and the last."""
 
     EARLY: ClassVar[int] = 5
-    first: Annotated[FiniteNumber, Claim()]
-    last: Annotated[FiniteNumber, Claim()]
-    early: Annotated[tuple[FiniteNumber, ...], Claim()] = ()
+    first: Annotated[FiniteNumber, Reproducible()]
+    last: Annotated[FiniteNumber, Reproducible()]
+    early: Annotated[tuple[FiniteNumber, ...], Reproducible()] = ()
 
 
 class Advice(SummaryPart):
@@ -367,11 +367,11 @@ class Span(SummaryPart):
 class Brief(SummaryPart):
     """Fields that every summary has; a run that is under way or was killed has no others."""
 
-    name: Annotated[Text, Claim()] = ""
-    description: Annotated[StrictStr, Claim()] = ""
-    status: Annotated[StrictStr, Field(pattern=r"^[a-z_: -]{1,40}$"), Claim(of_end=True)]
-    message: Annotated[Text, Claim(of_end=True)] = ""
-    exit_code: Annotated[StrictInt, Claim(of_end=True)] = 0
+    name: Annotated[Text, Reproducible()] = ""
+    description: Annotated[StrictStr, Reproducible()] = ""
+    status: Annotated[StrictStr, Field(pattern=r"^[a-z_: -]{1,40}$"), Reproducible(of_end=True)]
+    message: Annotated[Text, Reproducible(of_end=True)] = ""
+    exit_code: Annotated[StrictInt, Reproducible(of_end=True)] = 0
 
     @property
     def dataset_digest(self) -> str | None:
@@ -395,35 +395,35 @@ class Summary(Brief):
 
     warnings: tuple[Text, ...]
     warning_codes: tuple[Text, ...] = ()
-    samples: Annotated[StrictInt, Claim()]
-    samples_planned: Annotated[StrictInt, Claim()]
-    time_reached: Annotated[FiniteNumber, Claim()]
-    engine_time: Annotated[FiniteNumber | None, Claim()] = None
-    formulation: Annotated[Text, Claim()]
-    states: Annotated[tuple[Text, ...], Claim()]
-    precision: Annotated[Text, Claim()]
-    tolerance: Annotated[FiniteNumber, Claim()]
+    samples: Annotated[StrictInt, Reproducible()]
+    samples_planned: Annotated[StrictInt, Reproducible()]
+    time_reached: Annotated[FiniteNumber, Reproducible()]
+    engine_time: Annotated[FiniteNumber | None, Reproducible()] = None
+    formulation: Annotated[Text, Reproducible()]
+    states: Annotated[tuple[Text, ...], Reproducible()]
+    precision: Annotated[Text, Reproducible()]
+    tolerance: Annotated[FiniteNumber, Reproducible()]
     cost: Cost
-    method: Annotated[Text, Claim()] = DEFAULT_METHOD
-    hold_invariants: Annotated[StrictBool, Claim()] = False
-    hold_from_step: Annotated[StrictInt | None, Claim()] = None
+    method: Annotated[Text, Reproducible()] = DEFAULT_METHOD
+    hold_invariants: Annotated[StrictBool, Reproducible()] = False
+    hold_from_step: Annotated[StrictInt | None, Reproducible()] = None
     invariants: dict[Text, InvariantDrift]
     unwatched: dict[Text, Text] = Field(default_factory=dict)
     accuracy: Accuracy
     modelling: Modelling | None = None
     tables: dict[Text, TableErrors] = Field(default_factory=dict)
     lyapunov: Lyapunov | None = None
-    body: Annotated[UnderstoodBody, Claim()]
-    start: Annotated[Start | None, Claim()] = None
-    time: Annotated[Span | None, Claim()] = None
+    body: Annotated[UnderstoodBody, Reproducible()]
+    start: Annotated[Start | None, Reproducible()] = None
+    time: Annotated[Span | None, Reproducible()] = None
     loads: tuple[Text, ...] = ()
     bit_for_bit: BitForBit
     provenance: dict[Text, StrictStr | StrictInt]
-    events: Annotated[dict[Text, StrictInt], Claim()] = Field(default_factory=dict)
+    events: Annotated[dict[Text, StrictInt], Reproducible()] = Field(default_factory=dict)
     event_times: dict[Text, EventTimes] = Field(default_factory=dict)
-    chart_changes: Annotated[ChartChanges | None, Claim()] = None
+    chart_changes: Annotated[ChartChanges | None, Reproducible()] = None
     advice: tuple[Advice, ...] = ()
-    undefined_samples: Annotated[dict[Text, StrictInt], Claim()] = Field(default_factory=dict)
+    undefined_samples: Annotated[dict[Text, StrictInt], Reproducible()] = Field(default_factory=dict)
     dataset_sha256: Digest | None = None
     timeline_sha256: Digest | None = None
 

@@ -12,7 +12,7 @@ from rigidsim.errors import RunFolderError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.store.provenance import read_attributes
-from rigidsim.workflows.read import as_begun, embedded, refuse_other_kernel
+from rigidsim.workflows.read import embedded, refuse_other_kernel, with_recorded_variables_of
 from rigidsim.workflows.run import run
 
 RATES, ATTITUDE = "angular_velocity", "quaternion"
@@ -28,7 +28,7 @@ def experiment_again(dataset: Path) -> Experiment:
     loads = read_attributes(dataset).get("python_loads")
     if loads:
         raise RunFolderError(f"{dataset}: the run had loads from Python ({loads}), which its config lacks")
-    experiment = as_begun(begun, dataset)
+    experiment = with_recorded_variables_of(begun, dataset)
     refuse_other_kernel(experiment, dataset)
     config = experiment.config
     tables = {

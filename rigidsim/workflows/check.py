@@ -8,7 +8,7 @@ from rigidsim.accuracy.choice import fully
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.sweep import Sweep
 from rigidsim.session.dataset import refuse_taken_names
-from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, told_loads
+from rigidsim.session.understood import body_of, cautions_of, load_descriptions, span_of, start_of
 from rigidsim.solve.problem import prepare
 from rigidsim.store.summary import Span, Start, SummaryPart, UnderstoodBody, as_fields
 from rigidsim.workflows.read import load
@@ -57,5 +57,5 @@ def check(path: str | Path, *, overrides: Sequence[str] = ()) -> Checked:
         body=body_of(scene),
         start=start_of(scene),
         time=span_of(scene),
-        loads=list(told_loads(prepared)),
+        loads=list(load_descriptions(prepared)),
     )

@@ -19,7 +19,7 @@ from rigidsim.model.equation_text import equation_texts
 from rigidsim.model.load import Load
 from rigidsim.session.dataset import dataset_variables, refuse_taken_names, unused_variables
 from rigidsim.session.session import storage
-from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, told_loads
+from rigidsim.session.understood import body_of, cautions_of, load_descriptions, span_of, start_of
 from rigidsim.solve.assembly import Assembly, assemble
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.projection import LATE
@@ -89,8 +89,8 @@ class Predicted(SummaryPart):
         pace: 1, or None if torques change the length of steps after the pilot's.
         modelling_seconds: CPU time of the full model beside an averaged one.
         free_bytes: free space on the disk; infinite if unknown.
-        attitude_error_rad: None without an attitude, or if the method tells its own errors; ``held``: whether
-            it is with projected invariants.
+        attitude_error_rad: None without an attitude, or if the method reports its own errors; ``held``:
+            whether it is with projected invariants.
         amplification, growth_seconds: of rounding errors by the end; span over which that was followed.
     """
 
@@ -235,7 +235,7 @@ def plan(
         euler_partner_sequence=None if system.partner is None else system.partner.sequence,
         states=list(system.states),
         state_count=len(system.states),
-        loads=list(told_loads(prepared)),
+        loads=list(load_descriptions(prepared)),
         reasons=[StatesWhy(states=states, why=why) for states, why in system.reasons],
         left_out=[LeftOut(what=what, why=why) for what, why in system.left_out],
         switching=[PlannedSurface(surface=s.text, where=s.where) for s in system.plan.surfaces.found],

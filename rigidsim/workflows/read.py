@@ -89,7 +89,7 @@ def embedded(dataset: Path, *, overrides: Sequence[str] = ()) -> Experiment:
     return replace(experiment, given=given, settings=(*settings.splitlines(), *experiment.settings))
 
 
-def as_begun(experiment: Experiment, saved: Path) -> Experiment:
+def with_recorded_variables_of(experiment: Experiment, saved: Path) -> Experiment:
     """The experiment with what its begun run records made explicit where the config leaves it open; the text
     stays as it is.
     """

@@ -99,12 +99,12 @@ def described() -> dict[str, str]:
 
 def by_subject() -> Iterator[tuple[str, dict[str, str]]]:
     """The scenes of each subject with their descriptions, and other names that they go by."""
-    told = described()
+    descriptions = described()
     also: dict[str, list[str]] = {}
     for alias, name in ALIASES.items():
         also.setdefault(name, []).append(alias)
     for subject, names in SUBJECTS.items():
-        rows = {name: told[name] for name in names if name in told}
+        rows = {name: descriptions[name] for name in names if name in descriptions}
         known = {name: f" (also {', '.join(also[name])})" if name in also else "" for name in rows}
         yield subject, {name: f"{text}{known[name]}" for name, text in rows.items()}
 

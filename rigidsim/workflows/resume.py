@@ -29,7 +29,7 @@ from rigidsim.store.run import SavedRun, open_run
 from rigidsim.store.seal import check_seal
 from rigidsim.store.segments import Chain, read_chain
 from rigidsim.store.summary import Summary
-from rigidsim.workflows.read import as_begun, embedded, refuse_other_kernel, text_difference
+from rigidsim.workflows.read import embedded, refuse_other_kernel, text_difference, with_recorded_variables_of
 from rigidsim.workflows.run import certified
 
 _ROWS_AT_ONCE = 65536
@@ -90,7 +90,7 @@ def resume(
             raise RunFolderError(f"{folder.path}: its dataset.h5 is missing; run it again with {FORCE}")
         chain = _of_finished(folder) if finished else read_chain(folder.segments)
         if chain.paths:
-            experiment = as_begun(_continued(experiment, chain.paths[-1]), chain.paths[0])
+            experiment = with_recorded_variables_of(_continued(experiment, chain.paths[-1]), chain.paths[0])
             refuse_other_kernel(experiment, chain.paths[-1])
         prepared = prepare(experiment, loads=loads)
         if chain.paths:

@@ -78,7 +78,7 @@ def run(
         tuning: how often to check and save, and when to look for a cheaper model; no bit depends on it.
 
     Returns:
-        The run; its ``status`` tells how it ended, which need not be "finished".
+        The run; its ``status`` says how it ended, which need not be "finished".
 
     Raises:
         ConfigError: the config can't be run; nothing was written.
@@ -120,7 +120,7 @@ def _run(
         if leaves_choice(experiment):
             observer.choosing(experiment.config.name)
             try:
-                setting, choice = chosen(experiment, loads=loads, beyond=beyond, told=observer.trying)
+                setting, choice = chosen(experiment, loads=loads, beyond=beyond, report=observer.trying)
             except ConfigError:
                 if result is None:
                     raise
@@ -182,7 +182,7 @@ def certified(
             accuracy_position=place,
             loads=loads,
             known=None if choice is None else choice.known,
-            told=session.observer.trying,
+            report=session.observer.trying,
         )
     known: dict[str, Any] = {"requested": requested}
     if place is not None:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigidsim.accuracy.bench import DEFAULT, TOLD, BestSetting, advice, measure
+from rigidsim.accuracy.bench import ATTRIBUTES, DEFAULT, BestSetting, advice, measure
 from rigidsim.errors import RigidsimError, RunFolderError
 from rigidsim.scene.choices import FULL
 from rigidsim.scene.config import Experiment
@@ -87,7 +87,7 @@ class Tradeoff:
                 }
                 for one in (data.isel(other=n) for n in range(data.sizes.get("other", 0)))
             ],
-            **{key: _plain(value) for key, value in data.attrs.items() if key in TOLD},
+            **{key: _plain(value) for key, value in data.attrs.items() if key in ATTRIBUTES},
             "advice": [asdict(a) for a in self.advice],
             "settings": rows,
             "folder": None if self.folder is None else str(self.folder),
@@ -130,7 +130,7 @@ def tradeoff(
     resolved = experiment
     if experiment.config.model.level != FULL:
         resolved = experiment.having([f'model.level="{FULL}"', "model.short_period=false"])
-    dataset = measure(resolved, budget=budget, repeats=repeats, full=full, told=told)
+    dataset = measure(resolved, budget=budget, repeats=repeats, full=full, report=told)
     dataset = with_others(with_models(dataset, experiment), judged)
     result = Tradeoff(dataset, folder)
     if folder is not None:

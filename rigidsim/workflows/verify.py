@@ -22,7 +22,7 @@ from rigidsim.store.provenance import SETTING, changed, platform_of, read_attrib
 from rigidsim.store.reader import open_dataset
 from rigidsim.store.run import open_run
 from rigidsim.store.seal import check_seal
-from rigidsim.store.summary import Brief, Claim, Summary
+from rigidsim.store.summary import Brief, Reproducible, Summary
 from rigidsim.workflows.again import experiment_again
 from rigidsim.workflows.read import text_difference
 from rigidsim.workflows.run import run
@@ -65,12 +65,12 @@ class Verdict:
     def as_dict(self) -> dict[str, Any]:
         """Values for JSON."""
         first = self.difference
-        told = asdict(self) | {"first_difference": first and asdict(first) | {"size": first.size}}
-        told["differing_variables"] = told.pop("differing")
+        report = asdict(self) | {"first_difference": first and asdict(first) | {"size": first.size}}
+        report["differing_variables"] = report.pop("differing")
         back = self.reversal
-        told["reversal"] = back and asdict(back) | {"words": back.words}
-        del told["difference"]
-        return told
+        report["reversal"] = back and asdict(back) | {"words": back.words}
+        del report["difference"]
+        return report
 
 
 def verify(path: str | Path, *, reversed: bool = False, observer: Observer | None = None) -> Verdict:
@@ -179,7 +179,7 @@ def _compare(saved: Path, again: Path) -> tuple[list[str], Difference | None, in
             first = None
             try:
                 first = _first_difference(name, one[name], other[name]) if comparable else None
-            except OSError:  # rows that can't be unpacked; the seal has told that the file is damaged
+            except OSError:  # rows that can't be unpacked; the seal has shown that the file is damaged
                 comparable = False
             if first is not None or not comparable:
                 found[name] = first
@@ -234,11 +234,11 @@ def _summary_problems(saved: Brief, again: Brief, folder: RunFolder) -> list[str
 
 
 def _claims(part: BaseModel, ended: bool, where: str = "") -> Iterator[tuple[str, str]]:
-    """The fields marked as claims, in this part and in parts within, as dotted names with JSON."""
+    """The fields marked as reproducible, in this part and in parts within, as dotted names with JSON."""
     given = part.model_dump(mode="json", exclude_unset=True)
     for name, field_info in type(part).model_fields.items():
         value, key = getattr(part, name), f"{where}{name}"
-        claim = next((mark for mark in field_info.metadata if isinstance(mark, Claim)), None)
+        claim = next((mark for mark in field_info.metadata if isinstance(mark, Reproducible)), None)
         if claim is not None:
             if name in given and (ended or not claim.of_end):
                 yield key, json.dumps(given[name], sort_keys=True)

@@ -12,7 +12,7 @@ from rigidsim.look import viewer
 from rigidsim.scene.sweep import Sweep
 from rigidsim.store import pictures
 from rigidsim.store.fits import is_fit
-from rigidsim.store.pictures import Told
+from rigidsim.store.pictures import FrameProgress
 from rigidsim.store.run import Run, SavedRun, open_run
 from rigidsim.store.sweeps.folder import is_sweep, open_sweep
 from rigidsim.workflows.compare.as_run import open_any
@@ -73,20 +73,20 @@ def show(named: Sequence[tuple[str, Run]], *, web: bool = False) -> int:
 
 
 def render(
-    named: Sequence[tuple[str, Run]], target: Path, *, seconds: float | None = None, told: Told | None = None,
-    at: str | None = None, part: str = "page",
+    named: Sequence[tuple[str, Run]], target: Path, *, seconds: float | None = None,
+    progress: FrameProgress | None = None, at: str | None = None, part: str = "page",
 ) -> Path:  # fmt: skip
     """Draw a run to a PNG picture, or a GIF or MP4 film, without a screen; or several runs side by side, of
     which there is the page alone. See ``store.pictures.draw``.
     """
     if len(named) == 1:
         with named[0][1].dataset as dataset:
-            pictures.draw(dataset, target, seconds=seconds, told=told, at=at, part=part)
+            pictures.draw(dataset, target, seconds=seconds, progress=progress, at=at, part=part)
         return target
     if at is not None or part != "page":
         raise RunFolderError("--at and --part: are for the picture of a single run; leave them out")
     with _recording_of(named, bars=False) as timeline:
-        pictures.draw_recording(timeline, target, seconds=seconds, told=told)
+        pictures.draw_recording(timeline, target, seconds=seconds, progress=progress)
     return target
 
 

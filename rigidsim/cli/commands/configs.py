@@ -59,10 +59,10 @@ def plan(
     experiment = load(config, overrides=overrides or [])
     if physics is not None:
 
-        def told(text: str) -> None:
+        def report(text: str) -> None:
             print(f"{experiment.config.name}: {text}", file=sys.stderr, flush=True)
 
-        found = required_physics(experiment, physics, out=out, write=write, force=force, told=told)
+        found = required_physics(experiment, physics, out=out, write=write, force=force, told=report)
         answer(as_json, found.as_dict(), print_physics, found)
         return
     refuse_options('is for --physics ERROR, such as --physics "0.1 arcsec"', write=write, force=force)
@@ -83,12 +83,12 @@ def tradeoff(
     """Measure speed against accuracy of a scene."""
     experiment = load(config, overrides=overrides or [])
 
-    def told(text: str) -> None:
+    def report(text: str) -> None:
         print(f"{experiment.config.name}: {text}", file=sys.stderr, flush=True)
 
     result = measuring.tradeoff(
         experiment, others=[_file_and_seconds(text) for text in files or ()],
-        out=out, budget=budget, repeats=repeats, full=full, force=force, told=told,
+        out=out, budget=budget, repeats=repeats, full=full, force=force, told=report,
     ).as_dict()  # fmt: skip
     answer(as_json, result, print_tradeoff, result)
 

@@ -24,7 +24,7 @@ def fit(
         experiment = single_member(experiment, member)
     if write is not None:
         refuse_loss([write], experiment.files, force=force)
-    result = fitting.fit(experiment, out=out, force=force, told=_tell)
+    result = fitting.fit(experiment, out=out, force=force, told=_report)
     if write is not None:
         with writing(write) as new:
             new.write_text(result.experiment.text, encoding="utf-8")
@@ -33,12 +33,12 @@ def fit(
 
 def resume(path: Path, as_json: bool) -> int:
     """Go on with an interrupted fit."""
-    return _print(fitting.resume_fit(path, told=_tell), as_json)
+    return _print(fitting.resume_fit(path, told=_report), as_json)
 
 
 def verify(path: Path, as_json: bool) -> int:
     """Fit again and compare every number."""
-    verdict = fitting.verify_fit(path, told=_tell)
+    verdict = fitting.verify_fit(path, told=_report)
     answer(as_json, verdict.as_dict(), print_verdict, verdict.as_dict(), "variable")
     return 0 if verdict.identical else 1
 
@@ -54,5 +54,5 @@ def _print(result: FitResult, as_json: bool) -> int:
     return 0 if result.converged else 1
 
 
-def _tell(line: str) -> None:
+def _report(line: str) -> None:
     print(f"fit: {line}", file=sys.stderr, flush=True)

@@ -28,8 +28,8 @@ def analyse(
 ) -> None:
     """Find lines, save them, print them."""
     opened = open_any(run_path)
-    _tell_notes(opened)
-    usual = opened.folder.analysis if isinstance(opened, SavedRun) else _beside(opened, ANALYSIS)
+    _report_notes(opened)
+    usual = opened.folder.analysis if isinstance(opened, SavedRun) else _in_folder_of(opened, ANALYSIS)
     places = analysing.places_of(out or usual, opened.files, force=force)
     analysis = analysing.analyse(opened, variable or (), lines=lines)
     analysing.save(analysis, places)
@@ -58,7 +58,7 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None, for_slides: s
     if swept or SPECTRUM in (what or []):
         refuse_options("is for figures of a single run other than spectrum", for_slides=for_slides)
     saved = open_sweep(run_path) if swept else open_any(run_path)
-    _tell_notes(saved)
+    _report_notes(saved)
     wanted = list(dict.fromkeys(what or []))
     try:
         for name in () if swept else (one for one in wanted if one != ALL):
@@ -76,7 +76,7 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None, for_slides: s
             own += "" if for_slides is None else "_slide"
             usual = f"figure{own}.png"
             if isinstance(saved, ShownRun):
-                usual = _beside(saved, usual).name
+                usual = _in_folder_of(saved, usual).name
                 folder = saved.path.parent if out is None else out
             else:
                 folder = saved.folder.path if out is None else out
@@ -118,25 +118,25 @@ def view(
     named = runs_of(run_paths, member or ())
     refuse_loss(asked.values(), [path for _, one in named for path in one.files])
     for _, one in named:
-        _tell_notes(one)
+        _report_notes(one)
     for target in asked.values():
-        told = _tell if sys.stderr.isatty() else None
-        render(named, target, seconds=seconds, told=told, at=at, part=part or "page")
+        progress = _report_frames if sys.stderr.isatty() else None
+        render(named, target, seconds=seconds, progress=progress, at=at, part=part or "page")
         print(target)
     return 0 if asked else show(named, web=web)
 
 
-def _beside(shown: ShownRun, name: str) -> Path:
+def _in_folder_of(shown: ShownRun, name: str) -> Path:
     """Where what is made of another tool's file goes if nothing else is asked for."""
     return shown.path.with_name(f"{shown.path.stem}_{name}")
 
 
-def _tell_notes(opened: object) -> None:
+def _report_notes(opened: object) -> None:
     """Say how the file of another tool was read."""
     for text in opened.notes if isinstance(opened, ShownRun) else ():
         print(f"note: {text}", file=sys.stderr)
 
 
-def _tell(done: int, count: int) -> None:
+def _report_frames(done: int, count: int) -> None:
     end = "\n" if done == count else ""
     print(f"\r{done} of {count} frames", end=end, file=sys.stderr, flush=True)

@@ -94,8 +94,8 @@ def verify(run_path: Path, members: int | None, back: bool, as_json: bool) -> in
     else:
         with watched(None, True) as observer:
             verdict, what = verifying.verify(run_path, reversed=back, observer=observer), "sample"
-    told = verdict.as_dict()
-    answer(as_json, told, print_verdict, told, what)
+    report = verdict.as_dict()
+    answer(as_json, report, print_verdict, report, what)
     return 0 if verdict.identical else 1
 
 

@@ -16,7 +16,7 @@ from rigidsim.workflows.analyse import Saved
 
 _WIDE = 100  # columns, from which the tables of lines have all of theirs
 _ROUNDINGS = 256.0  # spacings of a value: what rounding leaves of a constant over many steps
-_SURE = 5.0  # errors, from which a secular rate is told once more
+_SURE = 5.0  # errors, from which a secular rate is repeated
 _DEGREE = math.pi / 180
 _ANGLES = (
     (_DEGREE, "deg"), (_DEGREE / 3600, "arcsec"), (_DEGREE / 3.6e6, "mas"), (_DEGREE / 3.6e9, "µas"),
@@ -160,7 +160,7 @@ def _lines(signal: SignalAnalysis, angle: bool, digits: int, length: float, *, n
 
 
 def _period(line: SpectralLine, length: float) -> str:
-    """The period; of a line without a label that hasn't come round once there is none to be told."""
+    """The period; of a line without a label that hasn't come round once there is none to show."""
     period = line.period
     if not math.isfinite(period):
         return "-"

@@ -37,9 +37,9 @@ def print_physics(plan: PhysicsPlan) -> None:
     least = plan.least
     without = ", ".join(least.left_out) or "nothing: every effect is required"
     on.line("least", f"within {arcsec_text(plan.error_arcsec)} leave out {without}", "bold")
-    on.line("", _told(least))
+    on.line("", _errors_and_cost(least))
     for model in plan.tried[:-1]:
-        on.line("tried", f"without {', '.join(model.left_out)}: {_told(model)}")
+        on.line("tried", f"without {', '.join(model.left_out)}: {_errors_and_cost(model)}")
     on.line("", "the least found; another set of effects may be smaller or cheaper")
     spent = [row.cpu_seconds for row in plan.effects]
     ends = [span_text(min(spent), 2), span_text(max(spent), 2)]
@@ -57,7 +57,7 @@ def print_physics(plan: PhysicsPlan) -> None:
         on.line("config", f"{plan.written}; rigidsim run {plan.written}")
 
 
-def _told(model: ComparedModel) -> str:
+def _errors_and_cost(model: ComparedModel) -> str:
     return (
         f"{arcsec_text(model.largest_arcsec)} at most, {arcsec_text(model.rms_arcsec)} rms, measured "
         f"({arcsec_text(model.expected_arcsec)} as the sum of its effects); "

@@ -168,11 +168,11 @@ def verdict_line(summary: Summary, *, brief: bool = False) -> tuple[str, str]:
     if found.soundness is Soundness.DRIFTED and not share > 1:  # what drifted has no finite size
         words = "not sound: see the warning"
     most = "" if brief else f", {_percent(share)} of it at most"
-    told = words.format(share=most, worst=found.worst, times=f"{share:.2g}")
+    verdict = words.format(share=most, worst=found.worst, times=f"{share:.2g}")
     model = summary.modelling
     if found.soundness is not Soundness.INACCURATE and model is not None and model.momentum_axis is None:
-        told += "; how far the averaged model is from the full one isn't known"
-    return told, _STYLES.get(found.soundness, "green")
+        verdict += "; how far the averaged model is from the full one isn't known"
+    return verdict, _STYLES.get(found.soundness, "green")
 
 
 def _percent(share: float) -> str:
@@ -358,14 +358,14 @@ def _print_cost(summary: Summary, on: Page, verbose: bool) -> None:
         on.line("CPU", f"{', '.join(spent)}; steps alone {span_text(cost.seconds[ENGINE])} wall")
 
 
-def print_understood(told: Checked | RunPlan | Summary, loads: Sequence[str], on: Page) -> None:
+def print_understood(understood: Checked | RunPlan | Summary, loads: Sequence[str], on: Page) -> None:
     """Print body, start, time (as far as an older summary has them) and what acts as they were understood."""
-    if told.body is not None:
-        on.line("body", body_text(told.body))
-    if told.start is not None:
-        on.line("start", start_text(told.start))
-    if told.time is not None:
-        on.line("time", time_text(told.time))
+    if understood.body is not None:
+        on.line("body", body_text(understood.body))
+    if understood.start is not None:
+        on.line("start", start_text(understood.start))
+    if understood.time is not None:
+        on.line("time", time_text(understood.time))
     for load in loads:
         on.line(*labelled(load))
 

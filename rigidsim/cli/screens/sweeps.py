@@ -51,47 +51,47 @@ _ERRORS = {
 
 def print_sweep(result: SavedSweep) -> None:
     """Print how a sweep's members ended."""
-    told, on = result.outcome, Page()
-    on.say((told.name, "bold"), f" ({result.place}): {told.message}")
+    outcome, on = result.outcome, Page()
+    on.say((outcome.name, "bold"), f" ({result.place}): {outcome.message}")
     place = shlex.quote(result.place)
     if not result.finished:
-        done = f"{told.tiles_done:,} of {told.tiles:,}" if told.tiles is not None else ""
-        if told.members_per_second:
-            left = clock_text(told.seconds_left)
-            on.line("blocks", f"{done}; {told.members_per_second:.3g} members a second, {left} left")
+        done = f"{outcome.tiles_done:,} of {outcome.tiles:,}" if outcome.tiles is not None else ""
+        if outcome.members_per_second:
+            left = clock_text(outcome.seconds_left)
+            on.line("blocks", f"{done}; {outcome.members_per_second:.3g} members a second, {left} left")
         elif done:
             on.line("blocks", done)
         if result.status == "interrupted":
             on.line("next", f"rigidsim resume {place}")
         return
-    on.line("axes", " x ".join(f"{name} {size:,}" for name, size in told.shape.items()))
-    ended = [[status, f"{number:,}"] for status, number in told.outcomes.items()]
+    on.line("axes", " x ".join(f"{name} {size:,}" for name, size in outcome.shape.items()))
+    ended = [[status, f"{number:,}"] for status, number in outcome.outcomes.items()]
     on.table(["ended", "members"], ended, ruled=False)
-    cost = told.cost
+    cost = outcome.cost
     assert cost is not None
-    engines = ", ".join(f"{n:,} {_ENGINES.get(engine, engine)}" for engine, n in told.engines.items())
+    engines = ", ".join(f"{n:,} {_ENGINES.get(engine, engine)}" for engine, n in outcome.engines.items())
     errors = f", {cost.estimate_cpu_seconds:.3g} s of them for errors" if cost.estimate_cpu_seconds else ""
-    steps = "" if _FITS in told.engines else f"{cost.steps:,} steps, "
+    steps = "" if _FITS in outcome.engines else f"{cost.steps:,} steps, "
     spent = f"{steps}{cost.cpu_seconds:.3g} s of CPU in {cost.tiles:,} blocks of members"
     on.line("cost", f"{spent} ({engines}){errors}")
-    if told.fitted:
+    if outcome.fitted:
         on.table(
-            ["parameter", "median", "spread", "sigma", ""], [_fitted(*row) for row in told.fitted.items()]
+            ["parameter", "median", "spread", "sigma", ""], [_fitted(*row) for row in outcome.fitted.items()]
         )
-    if told.why_alone is not None and told.engines.get("alone"):
-        on.line("", _one_by_one(told.why_alone))
-    for name, error in told.estimated_errors.items():
-        averaged = name == "attitude" and "modelling" in told.estimated_errors
+    if outcome.why_alone is not None and outcome.engines.get("alone"):
+        on.line("", _one_by_one(outcome.why_alone))
+    for name, error in outcome.estimated_errors.items():
+        averaged = name == "attitude" and "modelling" in outcome.estimated_errors
         words = _INTEGRATED if averaged else _ERRORS.get(name, name)
         units = "" if error.units == "1" else f" {error.units}"
         sizes = f"{error.median:.2g}{units} in the median, at most {error.largest:.2g}"
         on.line("error", f"{words}: {sizes}, estimated of {error.members:,} members")
-    for name, drift in told.largest_drifts.items():
+    for name, drift in outcome.largest_drifts.items():
         on.line("drift", f"{name.removesuffix('_drift')}: at most {drift:.2g}")
-    for text in told.warnings:
+    for text in outcome.warnings:
         on.line("warning", text, "yellow")
     on.line("next", f"rigidsim plot {place}")
-    if _FITS not in told.engines:
+    if _FITS not in outcome.engines:
         on.line("", f"rigidsim view {place} --member 0")
     on.line("", f"rigidsim export {place} --format csv")
 

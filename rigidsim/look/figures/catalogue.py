@@ -193,7 +193,7 @@ def draw_first(axes: Axes, panel: Panel, shown: Shown, begins: float) -> None:
     start = shown.start.assign_attrs(time_unit=unit_for(begins).symbol)
     panel.draw(axes, start, panel.find(start))
     for line in axes.get_lines():
-        if line.get_linestyle() == "None":  # few enough now to be told apart, and to be followed
+        if line.get_linestyle() == "None":  # few enough now to be distinguished and followed
             line.set(linestyle="-", linewidth=0.6, markersize=5.0)
     time, unit, _ = clock(start)
     axes.set(xlim=(time[0], time[0] + begins / unit.seconds), xlabel=f"time [{unit.symbol}]")

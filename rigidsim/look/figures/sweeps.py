@@ -38,7 +38,7 @@ _MOST_POINTS = 400_000
 _FILLED = 2.0  # area of a sphere's dots over that of its map
 _STILL = 1e-9  # variation between members or components, relative to the largest, that is rounding
 _NOISE = 1e-12  # of a signal's own size, below which a line or a secular rate is rounding
-_MOST_TOLD, _CROWDED, _LONGEST = 12, 60, 24  # values told at their ticks, their letters, and letters of one
+_MOST_SHOWN, _CROWDED, _LONGEST = 12, 60, 24  # values shown at their ticks, their letters, and letters of one
 _DECADES = 1.5  # from which on values of one sign have a logarithmic scale
 _FEWEST = 12  # directions that make a map
 _MOST_PANELS, _COLUMNS, _PANEL = 14, 2, 1.75  # of fits; inches high
@@ -73,8 +73,8 @@ class Axis:
             if lengths.min() > 0 and np.ptp(lengths) <= _STILL * lengths.max():
                 directions = values.values / lengths[:, None]
         if not numbers:
-            told = values is not None and count <= _MOST_TOLD
-            label = _named(values) if told and values is not None else f"{words}, counted from 0"
+            shown = values is not None and count <= _MOST_SHOWN
+            label = _named(values) if shown and values is not None else f"{words}, counted from 0"
             return cls(dim, np.arange(float(count)), label, texts, True, False, directions)
         divisor, unit = _unit_of(dataset, numbers[0])
         place = np.asarray(numbers[0].values, dtype=np.float64) / divisor
@@ -94,7 +94,7 @@ class Axis:
     def show(self, axes: Axes, which: str = "x") -> None:
         """Label an axis; ticks of numbered values have these, if they are few."""
         axes.set(**{f"{which}label": self.label}, **({f"{which}scale": "log"} if self.log else {}))
-        few = self.numbered and len(self.place) <= _MOST_TOLD and any(self.texts)
+        few = self.numbered and len(self.place) <= _MOST_SHOWN and any(self.texts)
         if few:
             turned = {"rotation": 25, "ha": "right"} if sum(map(len, self.texts)) > _CROWDED else {}
             getattr(axes, f"set_{which}ticks")(self.place, self.texts, **(turned if which == "x" else {}))
@@ -142,7 +142,7 @@ def drawable(dataset: xarray.Dataset) -> list[str]:
 
 
 def default_of(dataset: xarray.Dataset) -> str:
-    """What a sweep's figure shows where nothing is named: the first result that tells its members apart, no
+    """What a sweep's figure shows where nothing is named: the first result that differs between members, no
     conserved quantity and no rounding; the members' status where nothing does.
     """
     results = (name for name in drawable(dataset) if _rank(dataset, name) < _NO_RESULT)

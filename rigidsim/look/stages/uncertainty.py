@@ -4,7 +4,7 @@ A turn d (rad) of the attitude moves an axis a by d x a. With the covariance P o
 covariance M P M' across itself, where the rows of M are a x u and a x v for unit vectors u and v across it.
 The roots of its eigenvalues are the half-angles of an elliptical cone, which the body carries. A cone too
 narrow or too wide to be seen is drawn with its angles multiplied by one factor for the whole motion, which
-the legend tells.
+the legend states.
 """
 
 from dataclasses import dataclass, replace

@@ -178,9 +178,9 @@ class DrawnRun:
         explained = self.picture.stages if legend is None else legend
         if not explained:
             return
-        told = thinned_indices(len(self.seconds), entities.CLOCK_ROWS)
-        words = [f"t = {text}" for text in self.words.coarse(self.seconds[told].tolist())]
-        entities.draw_legend(recording, entities.legend_of(explained), words, self._times(told))
+        rows = thinned_indices(len(self.seconds), entities.CLOCK_ROWS)
+        words = [f"t = {text}" for text in self.words.coarse(self.seconds[rows].tolist())]
+        entities.draw_legend(recording, entities.legend_of(explained), words, self._times(rows))
 
     def draw_rows(self, recording: rr.RecordingStream, rows: slice) -> None:
         """Draw what changes, for some rows."""

@@ -52,7 +52,7 @@ from rigidsim.scene.arithmetic import Matrix, Vector, apply, cross, dot, norm, w
 from rigidsim.scene.attitude import rotation_matrix
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.effect_parts import EffectPart
-from rigidsim.scene.kernels.reading import Sight
+from rigidsim.scene.kernels.reading import RelativeEphemeris
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.registry import Setting, names_of, register_load
 from rigidsim.scene.scene import Scene
@@ -337,7 +337,7 @@ class Elasticity(Load, Carrier):
     delay: Any
     mean_rate: Any | None
     raising: tuple[int, ...]  # places in [[loads]]
-    sights: tuple[tuple[Sight, int], ...]  # of a kernel, with derivatives
+    sights: tuple[tuple[RelativeEphemeris, int], ...]  # of a kernel, with derivatives
     spins: bool = True  # whether the spin distorts, too
 
     title = "elasticity"

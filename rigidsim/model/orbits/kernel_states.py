@@ -32,7 +32,7 @@ from rigidsim.model.scaling import Rounder, Scaling
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.kernels.ephemeris import Ephemeris
-from rigidsim.scene.kernels.reading import Sight
+from rigidsim.scene.kernels.reading import RelativeEphemeris
 from rigidsim.scene.kernels.series import BlockSeries, chebyshev, exactly
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.space_axes import ECLIPTIC, obliquity, to_ecliptic
@@ -70,7 +70,7 @@ class KernelStates:
     def __init__(
         self,
         ephemeris: Ephemeris,
-        given: Sequence[tuple[Sight, int]],
+        given: Sequence[tuple[RelativeEphemeris, int]],
         scaling: Scaling,
         start: Any,
         context: Any,
@@ -100,7 +100,7 @@ class KernelStates:
 
     # --- expressions --------------------------------------------------------------------------------------
 
-    def seen(self, sight: Sight, order: int = 0) -> list[Symbolic]:
+    def seen(self, sight: RelativeEphemeris, order: int = 0) -> list[Symbolic]:
         """Vector of a sight in space axes, in units of 2^``sight.exponent`` km, or a derivative of it per
         internal unit of time.
 
@@ -272,6 +272,6 @@ def _name(series: BlockSeries, axis: int, order: int) -> str:
     return f"kernel_{series.target}_{_RATES[order]}{_AXES[axis]}"
 
 
-def sights_of(scene: Scene) -> list[Sight]:
+def sights_of(scene: Scene) -> list[RelativeEphemeris]:
     """The bodies of a kernel that a scene's loads see."""
     return list(dict.fromkeys(sight for load in scene.loads for sight, _ in load.sights))

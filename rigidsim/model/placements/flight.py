@@ -14,7 +14,7 @@ from rigidsim.model.placements.kernel_body import PlacedByKernel
 from rigidsim.model.placements.placement import AmongMasses, Placement, SourcePlace
 from rigidsim.model.rotations import Symbolic, length
 from rigidsim.scene.arithmetic import Vector, cross, norm
-from rigidsim.scene.kernels.reading import Sight
+from rigidsim.scene.kernels.reading import RelativeEphemeris
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, closest
 from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
@@ -97,7 +97,7 @@ class FlownByKernel(FlownBy):
         return self.origin.axes
 
     @property
-    def sights(self) -> tuple[tuple[Sight, int], ...]:  # type: ignore[override]
+    def sights(self) -> tuple[tuple[RelativeEphemeris, int], ...]:  # type: ignore[override]
         return ((self.origin.sight, 1),)
 
     @property

@@ -15,7 +15,7 @@ from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion
 from rigidsim.model.rotations import length
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.kernels.ephemeris import Ephemeris
-from rigidsim.scene.kernels.reading import Sight
+from rigidsim.scene.kernels.reading import RelativeEphemeris
 from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
 
@@ -33,7 +33,7 @@ class PlacedByKernel(Placement):
     """A body of the kernel, seen from the host."""
 
     ephemeris: Ephemeris
-    sight: Sight
+    sight: RelativeEphemeris
     untracked = ""
     moves: ClassVar[bool] = True
     wide = True  # unrolled, the polynomials take several times as long to compile
@@ -95,7 +95,7 @@ class PlacedByKernel(Placement):
         return place, velocity, acceleration
 
     @property
-    def sights(self) -> tuple[tuple[Sight, int], ...]:  # type: ignore[override]
+    def sights(self) -> tuple[tuple[RelativeEphemeris, int], ...]:  # type: ignore[override]
         return ((self.sight, 0),)
 
     def at_start(self, scene: Setting) -> Vector:

@@ -28,7 +28,7 @@ from rigidsim.model.rotations import Symbolic, unit
 from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.kernels.reading import Sight
+from rigidsim.scene.kernels.reading import RelativeEphemeris
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.point_masses import PointMasses
@@ -136,7 +136,7 @@ class Placement:
     without_plane: str = ""
     seconds_ahead: float = 0.0
     of_time: bool = False
-    sights: tuple[tuple[Sight, int], ...] = ()
+    sights: tuple[tuple[RelativeEphemeris, int], ...] = ()
     falling: Placement | None = None
     untracked: str = "only its place is known"
     without_elements: tuple[str, str] | None = None

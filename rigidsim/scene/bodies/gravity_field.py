@@ -7,7 +7,7 @@ The potential of the body at a distance r, in its body axes, is
 with unnormalized coefficients (J_n = -C_n0). Those of degree 2 are the inertia tensor's: here, degree 3 is
 the first.
 
-A file of a field is ICGEM (``.gfc``) or SHADR (``.tab`` of the Planetary Data System), told apart by its
+A file of a field is ICGEM (``.gfc``) or SHADR (``.tab`` of the Planetary Data System), recognised by its
 contents. ICGEM (Barthelmes & Foerste 2011): a header of keys and values up to ``end_of_head``, then rows
 ``gfc n m C S``, metres. SHADR: one line of radius (km), G M (km^3/s^2), its error, degree, order,
 normalization (0 none, 1 full), longitude and latitude of reference, then rows ``n, m, C, S``. Numbers keep

@@ -66,12 +66,12 @@ class _Shaped(ConfigTable):
 def _dimension(key: str, count: int) -> Any:
     """Type and description of a key that sizes shapes."""
     taking = [name for name, shape in SHAPES.items() if key in shape.dimensions]
-    told = f"{_SIZES[key]}; of {' and '.join(', '.join(taking).rsplit(', ', 1))}"
+    description = f"{_SIZES[key]}; of {' and '.join(', '.join(taking).rsplit(', ', 1))}"
     if count == 1:
-        return Positive[Metre] | None, Field(None, description=told, examples=[0.5])
+        return Positive[Metre] | None, Field(None, description=description, examples=[0.5])
     least = min(SHAPES[name].dimensions[key] for name in taking)
     sizes: dict[str, Any] = {"minItems": least, "maxItems": count}
-    field = Field(None, description=told, examples=[[4, 3, 2][:count]], json_schema_extra=sizes)
+    field = Field(None, description=description, examples=[[4, 3, 2][:count]], json_schema_extra=sizes)
     return list[Positive[Metre]] | None, field
 
 

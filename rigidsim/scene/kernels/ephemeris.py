@@ -14,7 +14,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.fields import ConfigTable
-from rigidsim.scene.kernels.reading import DAY, J2000_DATE, Kernel, KernelError, Sight, kernel_of
+from rigidsim.scene.kernels.reading import DAY, J2000_DATE, Kernel, KernelError, RelativeEphemeris, kernel_of
 from rigidsim.scene.kernels.series import exactly
 from rigidsim.scene.space_axes import CELESTIAL, ECLIPTIC, ICRF, obliquity, to_ecliptic
 from rigidsim.scene.validation_messages import nearest, shown
@@ -49,7 +49,7 @@ class Ephemeris:
     axes: str
     ahead: Fraction
     run: tuple[Any, Any]
-    used: list[Sight] = field(default_factory=list)
+    used: list[RelativeEphemeris] = field(default_factory=list)
 
     def refused(self, what: str) -> ConfigError:
         """The error of the kernel's key."""
@@ -64,7 +64,7 @@ class Ephemeris:
                 'others are in SPK files, which [ephemeris] kernel names by their path ("./NAME.bsp")'
             )
 
-    def sight(self, source: str, host: str) -> Sight:
+    def sight(self, source: str, host: str) -> RelativeEphemeris:
         """One body seen from another (empty: the barycentre) over the run.
 
         Raises:
@@ -90,7 +90,7 @@ class Ephemeris:
         sight = self.sight(body, "")
         return self.place(context, sight, self.run[0]), self.place(context, sight, self.run[0], 1)
 
-    def place(self, context: Any, sight: Sight, time: Any, order: int = 0) -> Vector:
+    def place(self, context: Any, sight: RelativeEphemeris, time: Any, order: int = 0) -> Vector:
         """Vector (mpf, m, space axes) of a sight at a time of the scene (mpf, s), or a derivative of it."""
         found = [_METRES * x for x in sight.at(context, time + exactly(context, self.ahead), order)]
         return to_ecliptic(found, obliquity(context)) if self.axes == ECLIPTIC else found

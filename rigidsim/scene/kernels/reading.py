@@ -57,7 +57,7 @@ class KernelError(ValueError):
 
 
 @dataclass(frozen=True)
-class Sight:
+class RelativeEphemeris:
     """One body of a kernel seen from another: the sum of series, each times an exact factor.
 
     Attributes:
@@ -113,7 +113,7 @@ class Kernel(ABC):
 
     @abstractmethod
     def path_of(self, body: str) -> list[tuple[Fraction, BlockSeries]]:
-        """A body's place relative to the solar system's barycentre, as the links of a ``Sight``."""
+        """A body's place relative to the solar system's barycentre, as links of a ``RelativeEphemeris``."""
 
     def strength(self, body: str) -> Fraction | None:
         """Gravitational parameter of a body, m^3/s^2; None if the kernel has none."""
@@ -124,7 +124,7 @@ class Kernel(ABC):
     def digest(self) -> str:
         """SHA-256 of what was read of it."""
 
-    def sight(self, source: str, host: str) -> Sight:
+    def sight(self, source: str, host: str) -> RelativeEphemeris:
         """One body seen from another; ``host`` may be empty, which is the solar system's barycentre."""
         factors: dict[BlockSeries, Fraction] = {}
         for sign, path in ((1, self.path_of(source)), (-1, self.path_of(host) if host else [])):
@@ -133,7 +133,7 @@ class Kernel(ABC):
         links = tuple((factor, series) for series, factor in factors.items() if factor != 0)
         if not links:
             raise KernelError(f'which has "{source}" where "{host or "the barycentre"}" is')
-        return Sight(source, host, links)
+        return RelativeEphemeris(source, host, links)
 
 
 class PackagedKernel(Kernel):

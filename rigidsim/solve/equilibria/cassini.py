@@ -96,14 +96,14 @@ def cassini_state(scene: Scene, number: int) -> InitialRotation:
         f"figure axis {degrees[0]} deg from the orbit's normal, {degrees[1]} deg from the axis about which "
     )
     where += f"its node moves; {'stable' if stable else 'unstable'}"
-    told = FoundStart(
+    found_start = FoundStart(
         name=name,
         described=f"Cassini state {number}, {step}: {where}",
         how=search.how + (" (in double precision)" if bits <= _DOUBLE else ""),
         exponents=exponents,
         stable=stable,
     )
-    return found.start(context, bits, told)
+    return found.start(context, bits, found_start)
 
 
 def _node(orbit: KeplerOrbit, time: Any) -> Any:

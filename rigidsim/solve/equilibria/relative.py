@@ -110,14 +110,14 @@ def relative_equilibrium(scene: Scene) -> InitialRotation:
         why = " (least dynamic potential)" if order == (0, 1, 2) else " (by gyroscopic torques alone)"
         said += why if stable else ""
     described = f"{near}{first} towards the source and {last} along the orbit's normal: {said}"
-    told = FoundStart(
+    found_start = FoundStart(
         name="relative",
         described=f"relative equilibrium, {described}",
         how=how,
         exponents=exponents,
         stable=stable,
     )
-    return found.start(context, precision.bits, told)
+    return found.start(context, precision.bits, found_start)
 
 
 def _orbit(scene: Scene) -> KeplerOrbit:

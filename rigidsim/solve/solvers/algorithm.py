@@ -31,7 +31,7 @@ class Algorithm:
         finds_events: whether its stepper looks for ``[[events]]``, which needs steps.
         sets_parameters: whether its stepper sets those of equations that change at surfaces or given times.
         takes_series: whether its steps are Taylor series, which a root of zero at the start has none of.
-        own_errors: whether it tells its errors itself (``Stepper.errors``), or has none to tell; if not, they
+        own_errors: whether it reports its errors itself (``Stepper.errors``), or has none; if not, they
             are estimated from motions that begin beside its own, in heyoka's rounding.
         form: the closed form that gives the states; None if none does.
     """

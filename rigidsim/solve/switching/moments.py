@@ -58,7 +58,7 @@ class Moments:
             elif system.clocked:
                 within = lines_in(surface.expression, self._context)
                 known = lines[j] = [line.zero for line in within]
-                zeros.update(x for line in within for x in self._beside(surface.expression, line))
+                zeros.update(x for line in within for x in self._zeros_near(surface.expression, line))
             zeros.update(known or ())
         scaling, one = system.scaling, self._context.one
         self._exact = sorted(scaling.internal(zero, self._context) for zero in zeros)
@@ -129,7 +129,7 @@ class Moments:
             found += [] if line is None else [line.zero]
         return found
 
-    def _beside(self, expression: Expression, line: LineInTime) -> Iterator[Any]:
+    def _zeros_near(self, expression: Expression, line: LineInTime) -> Iterator[Any]:
         """Zeros (s, mpf) of a function of time where a line within it is small."""
 
         def value(time: Any) -> Any:

@@ -72,32 +72,32 @@ def open_any(path: str | Path) -> SavedRun | ShownRun:
     trajectory = read_trajectory(given_path)
     epoch = trajectory.epochs[0] if trajectory.epochs else None
     given = attitudes_of(trajectory, epoch)
-    told = list(given.told)
+    notes = list(given.notes)
     if given.time_unit is None:
-        told.append("times were taken for s; name a unit: t [day]")
+        notes.append("times were taken for s; name a unit: t [day]")
     if given.rates is None and (given.kind == ANGLES or (given.kind == QUATERNION and not given.order)):
         raise RigidsimError(
             f"{path}: without angular velocities its convention can't be determined; name a quaternion "
             "qw qx qy qz, add wx wy wz, or let rigidsim compare CONFIG FILE --timeline find it"
         )
     if trajectory.settled:
-        told.append("attitude and rates were taken between the frames that the file names")
+        notes.append("attitude and rates were taken between the frames that the file names")
         found = attitude_conventions(given)[0]
         found = found if given.rates is None else replace(found, **rate_conventions(given)[0])
     elif given.rates is None:
-        told.append("the attitude was taken from body axes to space axes")
+        notes.append("the attitude was taken from body axes to space axes")
         found = attitude_conventions(given)[0]
     else:
         found, _ = find_convention(given, {})
-        told.append(f"taken as {found}: it turns at these")
+        notes.append(f"taken as {found}: it turns at these")
         if found.undecided:
             others = len(found.undecided)
-            told.append(f"{others} other conventions fit as well; compare decides with an experiment")
+            notes.append(f"{others} other conventions fit as well; compare decides with an experiment")
     dated = {"epoch": str(epoch)} if epoch is not None else {}
     name = given_path.stem
-    dataset = dataset_of_rows(given, found, {"title": name, "comment": "; ".join(told), **dated})
+    dataset = dataset_of_rows(given, found, {"title": name, "comment": "; ".join(notes), **dated})
     outcome = Brief(name=name, status="finished", message=f"is the file {given_path.name}")
-    return ShownRun(given_path, outcome, dataset, tuple(told))
+    return ShownRun(given_path, outcome, dataset, tuple(notes))
 
 
 def dataset_of_rows(given: Attitudes, found: Convention, attributes: Mapping[str, Any]) -> xarray.Dataset:

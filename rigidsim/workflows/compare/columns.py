@@ -57,7 +57,7 @@ class Attitudes:
         unit: of angles, as far as the file says it. rates: (rows, 3), in ``rate_unit``.
         positions, velocities: (rows, 3), SI.
         resolution: half the last digits that are written, of attitude, rates and times (s).
-        told: what a user should know of the columns.
+        notes: what a user should know of the columns.
     """
 
     trajectory: Trajectory
@@ -72,7 +72,7 @@ class Attitudes:
     positions: np.ndarray | None = None
     velocities: np.ndarray | None = None
     resolution: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    told: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     def at(self, rows: np.ndarray | slice) -> Attitudes:
         """These rows alone."""
@@ -91,9 +91,9 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
     Raises:
         RigidsimError: no attitude, no time, or rows that aren't finite, ascending, or enough.
     """
-    told = [f"left out, since they hold no real numbers: {', '.join(found.left_out)}"] * bool(found.left_out)
-    without = "".join(f" ({words})" for words in told)
-    told += found.notes
+    notes = [f"left out, since they hold no real numbers: {', '.join(found.left_out)}"] * bool(found.left_out)
+    without = "".join(f" ({words})" for words in notes)
+    notes += found.notes
     shown = ", ".join(found.columns)
     rows = len(next(iter(found.columns.values()), ()))
     if rows < LEAST_ROWS:
@@ -123,7 +123,7 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
     time_unit: str | None = "s"
     if found.epochs:
         if epoch is None:
-            told.append("the config has no [time] epoch: its time 0 was taken for the first row")
+            notes.append("the config has no [time] epoch: its time 0 was taken for the first row")
         zero = epoch or found.epochs[0]
         times = np.array([float(date.since(zero)) for date in found.epochs])
     else:
@@ -136,7 +136,7 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
         columns["time"] = [name]
         time_unit = _unit(found, [name]) or ("s" if name.lower() == "seconds" else None)
         times = found.column(name)
-    told += _refuse_rows(found, times, kind, taken[kind])
+    notes += _refuse_rows(found, times, kind, taken[kind])
     second = _seconds_in(time_unit or "s", found.source)
     resolution = found.resolution or (
         written_resolution(taken[kind], found.narrow, few=FEW),
@@ -149,7 +149,7 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
     return Attitudes(
         replace(found, columns=others), times * second, time_unit, kind, taken[kind], order, units[0],
         taken.get("rates"), units[1], taken.get("positions"), taken.get("velocities"),
-        (*resolution, by_times), told,
+        (*resolution, by_times), notes,
     )  # fmt: skip
 
 
@@ -208,7 +208,7 @@ def _refuse_rows(found: Trajectory, times: np.ndarray, kind: str, attitude: np.n
             row, more = found.row(int(np.argmax(bad))), f"({int(bad.sum()):,} such rows)"
             raise RigidsimError(f"{found.source}: {row}{what} {more}; {then}")
 
-    told, steps = [], np.diff(times, prepend=-np.inf)
+    notes, steps = [], np.diff(times, prepend=-np.inf)
     refuse(steps == 0, " has the time of the row before", "keep one row for each time")
     refuse(steps < 0, " is earlier than the row before", "sort the rows by time")
     if kind == MATRIX:
@@ -226,11 +226,11 @@ def _refuse_rows(found: Trajectory, times: np.ndarray, kind: str, attitude: np.n
             what = f": a quaternion of norm {norms[np.argmax(bad)]:.6g}, where {most:.6g} is the median"
             refuse(bad, what, "these are no rotations: remove or mend them")
         if abs(most - 1) > _NORM:
-            told.append(f"quaternions have the norm {most:.6g}; they were normalised")
+            notes.append(f"quaternions have the norm {most:.6g}; they were normalised")
     longest, step = int(np.argmax(steps[1:])) + 1, float(np.median(steps[1:]))
     if steps[longest] > _GAP * step:
-        told.append(
+        notes.append(
             f"between {found.row(longest - 1)} and the next the time advances by {steps[longest]:.6g}, where "
             f"{step:.6g} is the median: a gap, or times in mixed units"
         )
-    return told
+    return notes

@@ -64,7 +64,7 @@ class LocalDefects(SummaryPart):
         largest: angle, rad; rms: the same in the mean; time: of the largest, s.
         rate_largest: rad/s; None without rates in the trajectory.
         rows: number of rows that were started from.
-        window_s: length of the windows that models are told from integrators by.
+        window_s: length of the windows that separate models from integrators.
         unexplained: of the windows' attitude defects, rms of what differences of the rates don't explain
             over rms of what they do; without rates of what no added acceleration explains over all.
         missing_acceleration: rms, rad/s^2, that would explain the rates' defects, or the attitude's where
@@ -214,14 +214,14 @@ def compare(
     if not 0 < within < np.pi:
         raise RigidsimError(f"within: given {within:g}; an angle above 0 and below pi, in rad, is allowed")
     _refuse_far(given, float(scene.start), float(scene.samples.last))
-    told = list(given.told)
+    notes = list(given.notes)
     if given.time_unit is None:
-        told.append("times were taken for s; name a unit if they are in another: t [day]")
-    own, uncertainty = _own_motion(quiet, given.times, told)
+        notes.append("times were taken for s; name a unit if they are in another: t [day]")
+    own, uncertainty = _own_motion(quiet, given.times, notes)
     given = given.at(slice(own.sizes["time"]))
     motion = own["quaternion"].values, own["angular_velocity"].values
     found, more = find_convention(given, convention or {}, motion)
-    seen = Evidence(given, found, own, uncertainty, within, told + more, scene)
+    seen = Evidence(given, found, own, uncertainty, within, notes + more, scene)
     result = _result(seen, asked.config.name, {name: str(path) for name, path in paths.items()})
     if out is not None:
         result.save(out)
@@ -286,7 +286,7 @@ def _sampled(experiment: Experiment, times: np.ndarray) -> Run:
     return run(sampled, out=None, progress=False)
 
 
-def _own_motion(experiment: Experiment, times: np.ndarray, told: list[str]) -> tuple[xarray.Dataset, float]:
+def _own_motion(experiment: Experiment, times: np.ndarray, notes: list[str]) -> tuple[xarray.Dataset, float]:
     """The experiment at these times, up to its end if that is earlier; and the announced error of its
     attitude, rad (0 if unknown).
 
@@ -298,7 +298,7 @@ def _own_motion(experiment: Experiment, times: np.ndarray, told: list[str]) -> t
     if found.sizes["time"] < LEAST_ROWS:
         raise RigidsimError(f"the experiment's motion {message}, before the trajectory begins")
     if found.sizes["time"] < len(times):
-        told.append(f"the experiment's motion {message}; later rows aren't compared")
+        notes.append(f"the experiment's motion {message}; later rows aren't compared")
     return found, made.attitude_error or 0.0
 
 
@@ -351,7 +351,7 @@ def _result(seen: Evidence, name: str, files: Mapping[str, str]) -> Comparison:
         first_disagreement=Disagreement(time=float(seen.times[first]), row=trajectory.row(first))
         if beyond.any()
         else None,
-        told=seen.told,
+        told=seen.notes,
         **files,
     )
     made._dataset = xarray.Dataset(dataset, {"time": time}, attributes)

@@ -206,11 +206,11 @@ def find_convention(
             "rows are too far apart; rigidsim compare CONFIG FILE --timeline finds the convention with an "
             "experiment"
         )
-    told = []
+    notes = []
     if motion is not None and nearest > _FAR:
         why = "this is one in which it turns at its rates" if turns else "that found may be wrong"
-        told.append(f"no convention tried brings it near the experiment: {why}")
-    return replace(near[0], time_unit=given.time_unit or "s", undecided=[str(one) for one in near[1:]]), told
+        notes.append(f"no convention tried brings it near the experiment: {why}")
+    return replace(near[0], time_unit=given.time_unit or "s", undecided=[str(one) for one in near[1:]]), notes
 
 
 _NO_RATES: dict[str, Any] = {"rate_unit": "", "rate_axes": ""}

@@ -1,6 +1,6 @@
 """Local defects of a trajectory: where the experiment's equations lead from a row, beside where it goes.
 
-What tells a wrong model from a loose integrator is kinematics. Whatever torques act and whatever the moments
+Kinematics separates a wrong model from a loose integrator. Whatever torques act and whatever the moments
 of inertia are, the attitude is the integral of the angular velocity. So a motion of other equations, exactly
 integrated, leaves the reference that starts from one of its rows in rates first, and in attitude just by
 the integral of that: to first order d(theta)/dt = R (w - w_reference), with theta the rotation vector (space

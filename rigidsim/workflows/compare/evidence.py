@@ -87,16 +87,16 @@ class Evidence:
 
     def __init__(
         self, given: Attitudes, convention: Convention, own: xarray.Dataset, uncertainty: float,
-        within: float, told: list[str], scene: Scene,
+        within: float, notes: list[str], scene: Scene,
     ) -> None:  # fmt: skip
         """Read the rows.
 
         Args:
             own: the experiment at the trajectory's times. uncertainty: announced error of its attitude, rad.
-            within: rad, what attitudes may differ by and agree. told: gets what a user should know.
+            within: rad, what attitudes may differ by and agree. notes: gets what a user should know.
             scene: of the experiment, whose equations each row may start.
         """
-        self.given, self.convention, self.told = given, convention, told
+        self.given, self.convention, self.notes = given, convention, notes
         self._uncertainty, self._within = uncertainty, within
         self.explained: WindowsOfAttitudes | None = None
         self.times, self.quaternions = given.times, convention.quaternions(given)
@@ -132,7 +132,7 @@ class Evidence:
             self.states = self._states_of(FromStates(scene))
         except NotFromStates as error:
             self.why_not = str(error)
-            told.append(f"neither local defects nor drifts were measured: {error}")
+            notes.append(f"neither local defects nor drifts were measured: {error}")
 
     @cached_property
     def floor(self) -> tuple[float, str]:
@@ -180,7 +180,7 @@ class Evidence:
             flight = np.concatenate([given.positions, given.velocities], axis=1)
         if equations.others:
             names = ", ".join(equations.others)
-            self.told.append(f"the file has no {names}: each interval begins with the experiment's own")
+            self.notes.append(f"the file has no {names}: each interval begins with the experiment's own")
         return RowStates(equations, equations.motion(self.times), self.quaternions, rates, flight)
 
     def drifts(self) -> dict[str, np.ndarray]:
@@ -204,7 +204,7 @@ class Evidence:
         if self.rates is None:
             if (alone := self.first_alone) is None:
                 return None
-            self.told.append(
+            self.notes.append(
                 "the file has no angular velocities: defects are taken with the nearest rates, over "
                 f"{len(alone.rows)} windows of {alone.rows.shape[1]} rows"
             )
@@ -214,7 +214,7 @@ class Evidence:
         near = starts[np.diff(self.times)[starts] * self.rate < defects.RESOLVED]
         starts = near if len(near) else starts
         if len(starts) < count:
-            self.told.append(f"local defects were measured from {len(starts):,} of {count:,} rows")
+            self.notes.append(f"local defects were measured from {len(starts):,} of {count:,} rows")
         turns, slips = defects.row_defects(self.states.equations, self.times, self.states, starts)
         return starts, np.linalg.norm(turns, axis=1), np.linalg.norm(slips, axis=1)
 
@@ -369,17 +369,17 @@ def _by_rates(seen: Evidence, windows: defects.WindowDefects) -> Verdict | None:
     if max(windows.attitude, windows.explained) <= _ABOVE * noise:
         return None
     left, share = windows.unexplained, windows.share
-    told = (
+    measured = (
         f"of the attitude's defects ({windows.attitude:.2g} rad over spans of {windows.length:.3g} s) "
         f"differences of the rates explain {windows.explained:.2g} rad and leave {left:.2g} rad"
     )
     if share <= _MODEL or left <= 2 * noise:
-        return WRONG_MODEL, f"its equations are others, by {windows.acceleration:.3g} rad/s^2: {told}"
+        return WRONG_MODEL, f"its equations are others, by {windows.acceleration:.3g} rad/s^2: {measured}"
     if seen.turn > _FAR:
-        return UNDECIDED, f"{_rows_apart(seen)}: {told}"
+        return UNDECIDED, f"{_rows_apart(seen)}: {measured}"
     if share >= _INTEGRATOR:
-        return INTEGRATION_ERROR, f"its equations are these, loosely integrated: {told}"
-    return UNDECIDED, f"both its model and its integration may differ: {told}"
+        return INTEGRATION_ERROR, f"its equations are these, loosely integrated: {measured}"
+    return UNDECIDED, f"both its model and its integration may differ: {measured}"
 
 
 def _by_attitudes(seen: Evidence, windows: WindowsOfAttitudes | None) -> Verdict:
@@ -393,16 +393,16 @@ def _by_attitudes(seen: Evidence, windows: WindowsOfAttitudes | None) -> Verdict
             "write more digits to tell a model from an integration"
         )
     share, left = windows.unexplained / windows.size, windows.unexplained
-    told = f"of the attitudes' defects ({windows.size:.2g} rad) other moments or steady torques leave"
+    left_by_fits = f"of the attitudes' defects ({windows.size:.2g} rad) other moments or steady torques leave"
     if share <= _ALONE or (left <= 2 * noise and share <= _IN_NOISE):
         more = f"by {windows.acceleration:.3g} rad/s^2"
-        return WRONG_MODEL, f"its equations are others, {more}: {told} {left:.2g} rad"
+        return WRONG_MODEL, f"its equations are others, {more}: {left_by_fits} {left:.2g} rad"
     windows.explain(WIDER)
     if windows.unexplained / windows.size > _ALONE:
         loose = "its equations are these, loosely integrated"
-        return INTEGRATION_ERROR, f"{loose}: {told} {windows.unexplained:.2g} rad"
+        return INTEGRATION_ERROR, f"{loose}: {left_by_fits} {windows.unexplained:.2g} rad"
     return UNDECIDED, (
-        f"its model and its integration can't be distinguished: {told} {left:.2g} rad; write angular "
+        f"its model and its integration can't be distinguished: {left_by_fits} {left:.2g} rad; write angular "
         "velocities too (wx wy wz), or more rows"
     )
 

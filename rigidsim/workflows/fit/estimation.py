@@ -147,7 +147,7 @@ class Ended:
 def iterate(
     begin: np.ndarray,
     linearised: Callable[[np.ndarray], Linear | None],
-    told: Callable[[str], None] = lambda _: None,
+    report: Callable[[str], None] = lambda _: None,
     most: int = MOST_EVALUATIONS,
     within: float = WITHIN,
 ) -> Ended | None:
@@ -157,7 +157,7 @@ def iterate(
     Args:
         begin: (estimated,) first values.
         linearised: the fit at some values; None where the motion can't be computed.
-        told: receives a line on each evaluation.
+        report: receives a line on each evaluation.
 
     Returns:
         Where it ended; None if the motion can't be computed at the first values.
@@ -168,7 +168,7 @@ def iterate(
     solution, evaluations, damping, growth = Solution(linear), 1, 0.0, 2.0
     while True:
         length, cost = solution.step_sigmas, linear.cost
-        told(f"evaluation {evaluations}: sum of squares {cost:.6g}, next step {length:.2g} sigmas")
+        report(f"evaluation {evaluations}: sum of squares {cost:.6g}, next step {length:.2g} sigmas")
         if length <= within or evaluations >= most or damping > _DAMPING[1]:
             return Ended(values, linear, solution, length <= within, evaluations)
         step = solution.step(damping)
@@ -260,7 +260,7 @@ def inverse_right_jacobian(vectors: np.ndarray) -> np.ndarray:
 
 
 def search(
-    weighing: Weighing, starts: int, told: Callable[[str], None]
+    weighing: Weighing, starts: int, report: Callable[[str], None]
 ) -> tuple[Ended, list[float], list[str]]:
     """Fit from each start, and then again without rows beyond their limit until these stay the same.
 
@@ -271,7 +271,7 @@ def search(
     Raises:
         RigidsimError: from no start the motion can be computed, or too few rows are left.
     """
-    ended, costs, notes = _from_starts(weighing, starts, told)
+    ended, costs, notes = _from_starts(weighing, starts, report)
     seen: list[bytes] = []
     while len(seen) < _ROUNDS and _sort_out(weighing, ended):
         kept = b"".join(used.tobytes() for used in weighing.used)
@@ -280,8 +280,8 @@ def search(
             break
         seen.append(kept)
         left = sum(int((~used).sum()) for used in weighing.used)
-        told(f"round {len(seen)} of the outlier rule: {left} rows left out")
-        again = iterate(ended.values, weighing.linear, told)
+        report(f"round {len(seen)} of the outlier rule: {left} rows left out")
+        again = iterate(ended.values, weighing.linear, report)
         if again is None:
             raise RigidsimError(f"fit: {weighing.failure}")
         ended = again
@@ -297,7 +297,7 @@ def search(
 
 
 def _from_starts(
-    weighing: Weighing, starts: int, told: Callable[[str], None]
+    weighing: Weighing, starts: int, report: Callable[[str], None]
 ) -> tuple[Ended, list[float], list[str]]:
     """The best end of all starts: the config's values, then others from the priors, the same for the same
     config on any machine.
@@ -309,10 +309,10 @@ def _from_starts(
     costs: list[float] = []
     for number in range(starts):
         if starts > 1:
-            told(f"start {number + 1} of {starts}")
+            report(f"start {number + 1} of {starts}")
         away = np.random.default_rng([number]).standard_normal(len(keys)) if number else np.zeros(len(keys))
         most = MOST_EVALUATIONS if starts == 1 else _FROM_START
-        ended = iterate(begin + sigmas * away, weighing.linear, told, most)
+        ended = iterate(begin + sigmas * away, weighing.linear, report, most)
         costs.append(np.nan if ended is None else ended.linear.cost)
         if ended is not None and (best is None or ended.linear.cost < best.linear.cost * (1 - _SAME)):
             best = ended

@@ -51,7 +51,7 @@ _NAMES = (
 )  # fmt: skip
 _AGAIN = f"copy it again from where it is whole, or make the fit again ({FORCE})"
 
-Told = Callable[[str], None]
+Report = Callable[[str], None]
 
 
 def fit(
@@ -60,7 +60,7 @@ def fit(
     changes: Mapping[str, Any] | None = None,
     out: str | Path | None = None,
     force: bool = False,
-    told: Told | None = None,
+    told: Report | None = None,
 ) -> FitResult:
     """Estimate the parameters of a config's ``[fit]`` from its data.
 
@@ -73,7 +73,7 @@ def fit(
         told: receives lines on the progress.
 
     Returns:
-        The result; ``converged`` tells whether it may be used.
+        The result; ``converged`` says whether it may be used.
 
     Raises:
         ConfigError: the config has no [fit], or one that can't be used.
@@ -84,7 +84,7 @@ def fit(
     _refuse(asked)
     places = files_beside(asked)
     if out is None:
-        return fit_to(asked, places, told=told)
+        return fit_to(asked, places, report=told)
     folder, data = FitFolder(Path(out) / asked.config.name), [path for files in places for path in files]
     missing = [path for path in data if not path.exists()]
     if missing:
@@ -95,7 +95,7 @@ def fit(
         return _kept(asked, folder, told)
 
 
-def resume_fit(path: str | Path, *, told: Told | None = None) -> FitResult:
+def resume_fit(path: str | Path, *, told: Report | None = None) -> FitResult:
     """Make an interrupted fit from the copies of config and data in its folder.
 
     Raises:
@@ -110,7 +110,7 @@ def resume_fit(path: str | Path, *, told: Told | None = None) -> FitResult:
         return _kept(load(folder.config), folder, told)
 
 
-def verify_fit(path: str | Path, *, told: Told | None = None) -> Verdict:
+def verify_fit(path: str | Path, *, told: Report | None = None) -> Verdict:
     """Make a finished fit again and compare every number of its dataset, and its fitted config; the verdict's
     samples are variables.
 
@@ -127,7 +127,7 @@ def verify_fit(path: str | Path, *, told: Told | None = None) -> Verdict:
         for key, known in begun.items()
         if known != now.get(key)
     ]
-    again = fit_to(experiment, copies, told=told)
+    again = fit_to(experiment, copies, report=told)
     if again.experiment.text != folder.fitted.read_text(encoding="utf-8"):
         problems.append(f"{folder.fitted.name}: other values than those fitted again")
     one, other = ({str(name): x for name, x in y.variables.items()} for y in (saved, again.dataset))
@@ -142,11 +142,11 @@ def verify_fit(path: str | Path, *, told: Told | None = None) -> Verdict:
     return Verdict(str(folder.path), identical, problems, None, differing, changed, len(names))
 
 
-def _kept(experiment: Experiment, folder: FitFolder, told: Told | None) -> FitResult:
+def _kept(experiment: Experiment, folder: FitFolder, report: Report | None) -> FitResult:
     """Fit, and write the results."""
     from rigidsim.look.figures.fitted import save_fitted
 
-    result = fit_to(experiment, folder.copies(experiment), told=told)
+    result = fit_to(experiment, folder.copies(experiment), report=report)
     with atomic.replacing(folder.dataset) as temporary:
         result.dataset.to_netcdf(temporary, engine="h5netcdf")
     atomic.write_bytes(folder.fitted, result.experiment.text.encode())
@@ -176,7 +176,7 @@ def _refuse(experiment: Experiment) -> None:
         raise ConfigError(problems, experiment.source)
 
 
-def fit_to(experiment: Experiment, places: list[DataFiles], *, told: Told | None = None) -> FitResult:
+def fit_to(experiment: Experiment, places: list[DataFiles], *, report: Report | None = None) -> FitResult:
     """Fit by data in given files.
 
     Raises:
@@ -201,12 +201,12 @@ def fit_to(experiment: Experiment, places: list[DataFiles], *, told: Told | None
                 predictor = ByDifferences(keys, quiet, quantities)
                 predictor.how += f" ({error.problems[0].what})"
             weighing = Weighing(keys, readings, predictor)
-            ended, costs, more = search(weighing, table.starts, told or (lambda _: None))
+            ended, costs, more = search(weighing, table.starts, report or (lambda _: None))
             times = np.linspace(float(keys.scene.start), float(keys.scene.samples.last), _ALONG_ROWS)
             along = weighing.along(ended.values, times)
     except ConfigError as error:
         raise error.at(experiment.source) from None
-    notes = [*dict.fromkeys(text for one in readings for text in one.told), *more]
+    notes = [*dict.fromkeys(text for one in readings for text in one.notes), *more]
     return result_of(experiment.config.name, keys, weighing, ended, costs, predictor.how, notes, along, times)
 
 

@@ -188,7 +188,7 @@ class Readings:
         times: (rows,), s. values: (rows, components), SI; attitudes as quaternions (rows, 4).
         sigmas: (rows, components) of residuals, SI. rows: what the file calls them.
         outliers: beyond how many sigmas rows are left out; None: never.
-        sha256: of the file. told: what a user should know.
+        sha256: of the file. notes: what a user should know.
     """
 
     number: int
@@ -200,7 +200,7 @@ class Readings:
     sigmas: np.ndarray
     rows: Sequence[str]
     outliers: float | None
-    told: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     @property
     def label(self) -> str:
@@ -236,10 +236,10 @@ class _Reader:
 
     def readings(self) -> Readings:
         self.found = found = self._opened()
-        told = [f"{self.table.file}: {note}" for note in found.notes]
+        notes = [f"{self.table.file}: {note}" for note in found.notes]
         times, values = self._times(), self._values()
         sigmas = self._sigmas(len(times))
-        kept = self._within(times, told)
+        kept = self._within(times, notes)
         order = kept[np.argsort(times[kept], kind="stable")]
         rows = [found.row(n) for n in order]
         times, values, sigmas = times[order], values[order], sigmas[order]
@@ -259,14 +259,14 @@ class _Reader:
                 f"({len(same)} such rows); it would count twice: remove it"
             )
         if len(again):
-            told.append(
+            notes.append(
                 f"{self.table.file}: {len(again)} rows have the time of another one with other values; each "
                 "counts as an observation"
             )
         limit = None if self.table.outliers is None else float(self.table.outliers)
         return Readings(
             self.number, self.quantity, self.table.file, digest(self.files[0]), times, values, sigmas, rows,
-            limit, told,
+            limit, notes,
         )  # fmt: skip
 
     def _fault(self, key: str, what: str) -> ConfigError:
@@ -385,7 +385,7 @@ class _Reader:
             raise self._fault("sigma", f"given {given}; {_SIGMAS}")
         return np.full((count, width), value)
 
-    def _within(self, times: np.ndarray, told: list[str]) -> np.ndarray:
+    def _within(self, times: np.ndarray, notes: list[str]) -> np.ndarray:
         """Rows in the span of the run."""
         begin, end = float(self.scene.start), float(max(self.scene.end, self.scene.samples.last))
         inside = (times >= begin) & (times <= end)
@@ -396,7 +396,7 @@ class _Reader:
                 f"{times.min():.6g} to {times.max():.6g} s; change [time], or check epoch and scale"
             )
         if not inside.all():
-            told.append(
+            notes.append(
                 f"{self.table.file}: {int((~inside).sum())} of {len(times)} rows lie outside the run "
                 f"({span}) and were left out, first {self.found.row(int(np.argmin(inside)))}"
             )

@@ -229,13 +229,13 @@ def digits_text(value: float, sigma: float) -> str:
 
 def result_of(
     name: str, keys: FitKeys, weighing: Weighing, ended: Ended, costs: Sequence[float], derivatives: str,
-    told: Sequence[str], along: Prediction, times: np.ndarray,
+    notes: Sequence[str], along: Prediction, times: np.ndarray,
 ) -> FitResult:  # fmt: skip
     """The result of a search, with its dataset and the fitted config.
 
     Args:
         costs: sums of squares where each start ended.
-        derivatives: where they came from. told: what a user should know besides.
+        derivatives: where they came from. notes: what a user should know besides.
         along: predictions with derivatives at times (s) along the run, as far as the scene has them.
     """
     linear, solution, values, count = ended.linear, ended.solution, ended.values, len(keys.estimated)
@@ -296,7 +296,7 @@ def result_of(
         evaluations=ended.evaluations,
         starts=[_finite(cost) for cost in costs],
         derivatives=derivatives,
-        told=[*told, *_counted_twice(weighing.readings)],
+        told=[*notes, *_counted_twice(weighing.readings)],
     )  # fmt: skip
     known_words = {"long_name": "covariance with considered numbers; nan if undetermined"}
     square = ("parameter", "other_parameter")

@@ -36,6 +36,7 @@ from rigidsim.workflows.read import Given, as_experiment
 from rigidsim.workflows.resume import resume
 from rigidsim.workflows.run import run
 
+Report = Callable[[str], None]
 ARCSEC = math.degrees(1.0) * 3600.0
 """Arcseconds of a radian."""
 FIGURE = "ladder.png"
@@ -147,7 +148,7 @@ def required_physics(
     out: str | Path = "runs",
     write: str | Path | None = None,
     force: bool = False,
-    told: Callable[[str], None] = lambda _: None,
+    told: Report = lambda _: None,
     tuning: Tuning | None = None,
 ) -> PhysicsPlan:
     """Measure what each effect of a scene is worth, and find a least model within an error.
@@ -158,7 +159,7 @@ def required_physics(
         out: the runs are kept in ``out/NAME-physics``; called again, it goes on with them.
         write: file for the least model's config.
         force: replace runs of another config, and the file.
-        told: is given a line before each run.
+        told: receives a line before each run.
         tuning: as for ``rigidsim.run``.
 
     Raises:
@@ -286,10 +287,10 @@ class _Models:
     """
 
     def __init__(
-        self, given: Experiment, folder: Path, force: bool, tuning: Tuning | None, told: Callable[[str], None]
+        self, given: Experiment, folder: Path, force: bool, tuning: Tuning | None, report: Report
     ) -> None:
         self.effects, self.compared = effects_of(given.config), "quaternion"
-        self._folder, self._force, self._tuning, self._told = folder, force, tuning, told
+        self._folder, self._force, self._tuning, self._report = folder, force, tuning, report
         self._done: dict[tuple[str, ...], _ModelRun] = {}
         self._attitudes: list[np.ndarray] = []  # of the full model
         if given.config.model.level in REDUCED:
@@ -343,14 +344,14 @@ class _Models:
         begun = folder.config.exists() and (folder.dataset.exists() or folder.segments.exists())
         if begun and folder.config.read_text(encoding="utf-8") == model.text:
             if not folder.dataset.exists():
-                self._told(f"{model.config.name}: goes on")
+                self._report(f"{model.config.name}: goes on")
             return resume(folder.path, tuning=self._tuning, progress=False)
         if begun and not self._force:
             raise RunFolderError(
                 f"{folder.path}: holds the run of another config; {FORCE} replaces it, another {OUT} puts "
                 "these runs elsewhere"
             )
-        self._told(f"{model.config.name}: begun")
+        self._report(f"{model.config.name}: begun")
         return run(model, out=self._folder, force=begun, tuning=self._tuning, progress=False)
 
 

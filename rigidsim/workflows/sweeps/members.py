@@ -114,18 +114,18 @@ def _indicators(one: MemberSeries, times: np.ndarray, keep: Collection[str]) -> 
     """Chaos indicators from the growth of a tangent vector."""
     since = times if times.ndim == 1 else times.T
     way = -1.0 if since.size and (since[-1] < since[0]).any() else 1.0  # growth is that along the run
-    told = indicators(way * since, one.parts[0][:, :, 0].T)
+    chaos = indicators(way * since, one.parts[0][:, :, 0].T)
     labels = {
-        "megno": ("1", "mean exponential growth of nearby orbits: 2 for regular motion", told.megno),
-        "fli": ("1", "fast Lyapunov indicator: largest logarithm of the growth", told.fli),
-        "lyapunov": ("s-1", "largest Lyapunov exponent, as far as the samples reach", told.largest_exponent),
+        "megno": ("1", "mean exponential growth of nearby orbits: 2 for regular motion", chaos.megno),
+        "fli": ("1", "fast Lyapunov indicator: largest logarithm of the growth", chaos.fli),
+        "lyapunov": ("s-1", "largest Lyapunov exponent, as far as the samples reach", chaos.largest_exponent),
     }
     found: Kept = {}
     for name, (units, long_name, values) in labels.items():
         if name in keep:
             found[name] = kept(values, units, long_name, name)
             until = "time up to which the growth of a tangent vector is known"
-            found["growth_time"] = kept(way * told.until, "s", until, name)
+            found["growth_time"] = kept(way * chaos.until, "s", until, name)
     return found
 
 
@@ -686,7 +686,7 @@ def sweep_of(config: str, source: str = "the sweep's config") -> Sweep:
 
 @lru_cache(maxsize=4)
 def kernel_of_members(config: str, source: str) -> dict[str, Any]:
-    """What tells the kernels of a config's members; empty without one."""
+    """Identifies the kernels of a config's members; empty without one."""
     sweep = sweep_of(config, source)
     if not reads_kernels(sweep.base):
         return {}

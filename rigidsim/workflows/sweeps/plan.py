@@ -27,7 +27,7 @@ each axis, ``_OF_AN_AXIS`` of them, or ``_FEWER`` where the numbers of each memb
 _OF_AN_AXIS = 400
 _FEWER = 25
 _MOST_CORNERS = 64
-_MOST_TOLD = 10
+_MOST_SHOWN = 10
 _AT_ONCE = 4096
 QUICK = 1_000_000
 """Up to this many members are all checked for a plan; a sweep checks all."""
@@ -62,7 +62,7 @@ def check_sweep(sweep: Sweep, *, each: Each = map, most: float = math.inf) -> In
     first = prepare(sweep.worked_out(first_possible(sweep)))
     refuse_taken_names(first)
     problems = _problems(sweep, each, most) if sweep.table.impossible != "mark" else []
-    if len(problems) >= _MOST_TOLD:
+    if len(problems) >= _MOST_SHOWN:
         problems.append(Problem("[sweep]", "there may be more members of this kind; these came first"))
     if problems:
         raise ConfigError(markable(problems), sweep.experiment.source)
@@ -74,7 +74,7 @@ def _problems(sweep: Sweep, each: Each, most: float) -> list[Problem]:
     if problems := _worked_out(sweep, _FEWER):
         return problems
     refused, accepted = list[int](), 0
-    for refused, some in given:  # up to a share that tells of none
+    for refused, some in given:  # up to a share that says so of none
         accepted += some
         if refused or not some:
             break
@@ -101,7 +101,7 @@ def _worked_out(sweep: Sweep, most: int, *, equations: bool = False) -> list[Pro
                 check_start(build_scene(experiment))
         except ConfigError as error:
             problems += sweep.with_member_named(member, error).problems
-            if len(problems) >= _MOST_TOLD:
+            if len(problems) >= _MOST_SHOWN:
                 break
     return problems
 
@@ -118,8 +118,8 @@ def _shares(sweep: Sweep, each: Each) -> Iterable[Share]:
 def refused_of(share: tuple[str, str, int, int]) -> Share:
     """Of a share (config, source, first, stop): members no run accepts, and how many can be run together."""
     config, source, begin, end = share
-    refused, accepted = batches_of(config, source).refused(range(begin, end), _MOST_TOLD)
-    return sorted(refused)[:_MOST_TOLD], accepted
+    refused, accepted = batches_of(config, source).refused(range(begin, end), _MOST_SHOWN)
+    return sorted(refused)[:_MOST_SHOWN], accepted
 
 
 def _tried(sweep: Sweep, most: int) -> Iterator[int]:
@@ -160,7 +160,7 @@ def _refuse_names(sweep: Sweep) -> None:
         raise ConfigError(problems, sweep.experiment.source)
 
 
-def refuse_untold_tiles(sweep: Sweep) -> None:
+def refuse_unknown_tiles(sweep: Sweep) -> None:
     """Refuse shares of tiles whose number depends on how fast a machine is."""
     if sweep.table.tile is None and sweep.count > _FEW and not sweep.fits:
         length = max(_FEW, sweep.count // 1000)

@@ -44,7 +44,7 @@ from rigidsim.workflows.sweeps.members import (
     sweep_of,
     why_alone,
 )
-from rigidsim.workflows.sweeps.plan import Each, check_sweep, refuse_untold_tiles, tile_length
+from rigidsim.workflows.sweeps.plan import Each, check_sweep, refuse_unknown_tiles, tile_length
 
 _DECIDING = ("version_", "cpu_model", "ephemeris_", "orientation_")  # what decides on bits
 _ERRORS = {
@@ -251,7 +251,7 @@ def _run(
     if share is not None and force:
         raise RunFolderError(f"{FORCE} is for a sweep as a whole, and its tiles are computed by others, too")
     if share is not None and begun is None:
-        refuse_untold_tiles(wanted)
+        refuse_unknown_tiles(wanted)
     files = given_files(wanted) if wanted.fits else []
     refuse_other_data(files, beside, folder.data, anew=force)
     observer.checking(wanted)
@@ -309,7 +309,7 @@ def _complete(wanted: Sweep, folder: SweepFolder) -> bool:
 def _refuse_other(wanted: Sweep, folder: SweepFolder) -> None:
     """Refuse a folder whose sweep has different members altogether.
 
-    The config beside a finished dataset tells this, too: its tiles may have been deleted.
+    The config saved with a finished dataset says this, too: its tiles may have been deleted.
     """
     begun = folder.begun
     if begun is None and not folder.dataset.exists():
