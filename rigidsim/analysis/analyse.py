@@ -139,7 +139,7 @@ def _rate(raw: _Raw, clock: EquidistantTimes) -> tuple[Any, float]:
 
 
 def _largest_rate(dataset: xarray.Dataset) -> float:
-    """Of a recorded angular velocity the size at its fastest, rad/s; 0 without one."""
+    """Largest size of a recorded angular velocity, rad/s; 0 without one."""
     if "angular_velocity" not in dataset or "time" not in dataset["angular_velocity"].dims:
         return 0.0
     rates = dataset["angular_velocity"].transpose("time", ...).values
@@ -249,7 +249,7 @@ def _notes(
     if any(at_nyquist(raw.found.sum, raw.signal.real)):
         notes.append(
             "a line within a third of a bin of Nyquist's frequency: samples show its amplitude times the "
-            "cosine of its phase, and no more; sample more often to tell these apart"
+            "cosine of its phase, and no more; sample more often to separate these"
         )
     unfolded = [line for line in lines if line.unfolded]
     if unfolded:

@@ -211,7 +211,7 @@ def _judged(samples: SignalSamples, total: Sum, order: int, search: _Search) -> 
         near = found.sizes[found.around(abs(frequency) if samples.real else frequency, 3 * (order + 2))]
         return math.sqrt(float(np.mean(near**2))) if len(near) else float(found.sizes.max())
 
-    # neighbours that are hard to tell apart make errors grow
+    # neighbours that are hard to separate make errors grow
     growth = refinement.error_growth(mirrored(total, samples.real), order)
     powers, lines = len(total.polynomial), len(total.frequencies) * (2 if samples.real else 1)
     held = refinement.at_nyquist(total, samples.real)

@@ -13,7 +13,7 @@ from rigidsim.analysis.exponentials import Complexes, Grid, Reals, Sum
 from rigidsim.analysis.windows import hann, moments, positions
 
 _MOST_STEPS = 25
-CLOSEST = 0.6  # bins between lines below which Newton's method can't tell them apart
+CLOSEST = 0.6  # bins between lines below which Newton's method can't separate them
 
 
 @dataclass(frozen=True)

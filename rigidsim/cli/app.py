@@ -300,7 +300,7 @@ def fit(
     as_json: options.JsonOption = False,
 ) -> None:
     """Estimate the parameters of the config's [fit] from its data: values, sigmas, correlations, residuals,
-    and what the data can't tell. Exit code 1 if the fit doesn't converge.
+    and what the data don't determine. Exit code 1 if the fit doesn't converge.
 
     Example: rigidsim fit toutatis_1992
     """

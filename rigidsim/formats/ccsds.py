@@ -179,7 +179,7 @@ def _write(
                 if now == previous:
                     raise RigidsimError(
                         f"samples {row - 1} and {row} are closer than 1e-{DIGITS} s, which time tags can't "
-                        "tell apart; export csv, or sample less often"
+                        "distinguish; export csv, or sample less often"
                     )
                 with localcontext(_WIDE):
                     file.write(" ".join([now, *map(_number, shown(state))]) + "\n")

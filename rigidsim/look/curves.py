@@ -161,7 +161,7 @@ def longitude(dataset: xarray.Dataset) -> Plot | None:
 
 
 def _legible(table: Array) -> bool:
-    """Whether ticks along angles (rows, n) tell their swings with few digits, nothing taken off."""
+    """Whether ticks along angles (rows, n) show their swings with few digits, nothing taken off."""
     finite = table[np.isfinite(table)]
     return bool(len(finite) and np.ptp(finite) >= _LEGIBLE * np.abs(finite).max())
 

@@ -83,7 +83,7 @@ def circulation(time: Array, plane: Array) -> SecularLine | None:
     """The mean motion of a point of a plane (rows, 2) about the origin; counterclockwise > 0.
 
     None if it doesn't go round, completes less than one turn, keeps speeding up or slowing down, or was
-    sampled too sparsely to tell.
+    sampled too sparsely to decide.
     """
     finite = np.isfinite(plane).all(axis=1)
     phase = np.arctan2(plane[finite, 1], plane[finite, 0])

@@ -23,7 +23,7 @@ from rigidsim.look.solids import Array
 _STEADY = 1e-5  # of its size, within which the momentum's is constant: more than rounding in single precision
 _ALIKE = 1e-9  # of the largest, within which moments are equal, and of the momentum, within which h vanishes
 _SAME = 1e-4  # rad, within which two points are one
-_FLAT = 1e-7  # of the largest 1/K, squared, below which curvatures tell no stability
+_FLAT = 1e-7  # of the largest 1/K, squared, below which curvatures decide no stability
 _STARTS, _STEPS, _FAR = 300, 40, 0.2  # of Newton's method on the sphere; rad, that a step has at most
 _MOST = 6  # isolated equilibria of any gyrostat
 
@@ -114,7 +114,7 @@ class Gyrostat:
 
     @classmethod
     def of(cls, dataset: xarray.Dataset, row: int) -> Self | None:
-        """That of a finite row, as if motors stopped there; None if the size of the momentum changes."""
+        """The gyrostat of a finite row, as if motors stopped; None if the momentum's size changes."""
         whole, inertia, rates = path(dataset), tensor(dataset), signals.values(dataset, "angular_velocity")
         if whole is None or inertia is None or rates is None:
             return None

@@ -231,7 +231,7 @@ def sections(dataset: xarray.Dataset) -> list[Path]:
             dimension = str(dataset[full].dims[1])
             labels = dataset[dimension].values if dimension in dataset else np.arange(table.shape[1])
             divisor, unit = scaled(table, str(dataset[full].attrs.get("units", "")))
-            # the origin is their middle, which the names tell: a small section would be a dot far off
+            # the origin is their middle, which the names say: a small section would be a dot far off
             points = table[:, [one, other]] / divisor
             middle = (points.min(axis=0) + points.max(axis=0)) / 2
             across, up = (f"{labels[k]} − {at:.4g}" for k, at in zip((one, other), middle, strict=True))

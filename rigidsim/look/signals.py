@@ -66,7 +66,7 @@ def turned(vectors: Array, matrix: Array) -> Array:
 
 
 def finite_rows(vectors: Array) -> Array:
-    """Those of (rows, n) all of whose components are finite."""
+    """Rows of (rows, n) all of whose components are finite."""
     finite = np.isfinite(vectors)
     return vectors if finite.all() else vectors[finite.all(axis=1)]
 
@@ -237,7 +237,7 @@ def orientation(dataset: xarray.Dataset, axis: str) -> tuple[Array, Array] | Non
 
 
 def lever(dataset: xarray.Dataset) -> Array | None:
-    """Of a body held off its centre of mass under uniform gravity the arm (3,) to the latter, m, body axes;
+    """Arm (3,), m, body axes, to the centre of mass of a body held elsewhere under uniform gravity;
     None of others, such as a body held at its centre of mass, which gravity doesn't turn.
     """
     scene = scene_of(dataset)

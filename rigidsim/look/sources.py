@@ -172,7 +172,7 @@ class Librations:
 
 
 def librations(dataset: xarray.Dataset) -> Librations | None:
-    """Those of a dataset; None of a body that doesn't turn one face to its source."""
+    """Librations of a dataset; None of a body that doesn't turn one face to its source."""
     scene, seconds = scene_of(dataset), signals.seconds(dataset)
     rates, ways = signals.values(dataset, "angular_velocity", 3), toward(dataset)
     swing = signals.values(dataset, "libration", 2)
@@ -218,7 +218,7 @@ def _normal(pole: Array) -> tuple[Array, bool]:
 
 def pointing_angle(dataset: xarray.Dataset) -> tuple[str, str, Array] | None:
     """A body axis, a direction in words, and the angle (rows,), rad, between them: of the axis nearest to the
-    oncoming air or, where no other angles tell of it, to the source.
+    oncoming air or, where no other angles show it, to the source.
     """
     ways, towards = signals.values(dataset, "air_velocity", 3), "the oncoming air"
     if ways is None and not {"libration", "roll_pitch_yaw"} & set(dataset):

@@ -204,7 +204,7 @@ class TurningHarmonics:
         return hy.cos(angle), hy.sin(angle)
 
     def _inside(self, m: Kinematics, place: SourcePlace) -> Harmonics:
-        """Those of the direction from a centre to the body, in its own axes."""
+        """Harmonics of the direction from a centre to the body, in its own axes."""
         x, y, z = (along(m.fixed(axis), place.outwards) for axis in self.frame)
         if (turn := self._turn(m)) is not None:
             c, s = turn

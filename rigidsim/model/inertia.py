@@ -94,7 +94,7 @@ class MassDistribution:
 
 @dataclass(frozen=True)
 class VaryingInertia(Inertia):
-    """That of a ``MassDistribution`` less a constant part, of what turns on bearings."""
+    """The tensor of a ``MassDistribution`` less a constant part, of what turns on bearings."""
 
     matrix: SymbolicMatrix
     rates: SymbolicMatrix | None
@@ -102,7 +102,7 @@ class VaryingInertia(Inertia):
 
     @classmethod
     def of(cls, shape: MassDistribution, numbers: ScaledNumbers, number: Rounder) -> VaryingInertia:
-        """That of what turns with the body."""
+        """The tensor of what turns with the body."""
         less = [
             [x - y for x, y in zip(*rows, strict=True)]
             for rows in zip(numbers.inertia, numbers.turning_inertia, strict=True)
@@ -157,7 +157,7 @@ class ConstantInertia(Inertia):
 
     @classmethod
     def of(cls, numbers: ScaledNumbers, number: Rounder, context: Any) -> ConstantInertia:
-        """That of what turns with the body."""
+        """The tensor of what turns with the body."""
         return cls(numbers.turning_inertia, numbers.inverse_inertia, number, context)
 
     def times(self, vector: list[Symbolic]) -> list[Symbolic]:

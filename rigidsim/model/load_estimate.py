@@ -62,7 +62,7 @@ _OPPOSITE = 16  # states at which q and -q are compared
 _ROUNDING = 1e-9  # of the largest component: far above rounding, far below any load that means its sign
 
 Function = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Of times (n,) and states (names, n) to values (expressions, n), internal units."""
+"""From times (n,) and states (names, n) to values (expressions, n), internal units."""
 
 
 def estimate_drive(
@@ -205,7 +205,7 @@ class _Trial:
         def evaluated(times: np.ndarray, states: np.ndarray) -> np.ndarray:
             with np.errstate(all="ignore"):
                 found = np.asarray(function(np.ascontiguousarray(states), time=times))
-            # values that no run survives tell nothing about its scale
+            # values that no run survives say nothing about its scale
             return np.where(np.abs(found) < _LARGEST, found, 0.0)
 
         return evaluated

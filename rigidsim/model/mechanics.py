@@ -40,7 +40,7 @@ class Mechanics(Kinematics):
         flies: bool,
         **more: Any,
     ) -> Mechanics:
-        """Those of given rates and attitude; the vertical, where needed, follows from that or has states."""
+        """Mechanics of given rates and attitude, from which the vertical follows unless it has states."""
         up = list(hy.make_vars(*BODY.vertical)) if vertical else None
         if attitude is not None and numbers.arm is not None:
             up = numbers.vertical_of(attitude.matrix, number)
@@ -63,7 +63,7 @@ class Mechanics(Kinematics):
     @cached_property
     def observed(self) -> Mechanics:
         """The same for what is recorded and watched, whose parameters are no sides of surfaces: moments with
-        kinks tell these by the state.
+        kinks decide these by the state.
         """
         if self.shape is None or not self.surfaces.found:
             return self

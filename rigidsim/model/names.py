@@ -250,11 +250,11 @@ class BodyNames(NameProvider):
     brings = "x, y, z, vx, vy, vz with a position or velocity in [initial]"
 
     def names(self, config: Config) -> Iterable[Readable]:
-        """Those of a flight only where the body has one."""
+        """Names of a flight only where the body has one."""
         return (x for x in BODY_NAMES.values() if _flies(config) or "flight" not in x.states)
 
     def elsewhere(self, config: Config) -> str:
-        """Those of a flight."""
+        """Hints at names of a flight."""
         return "" if _flies(config) else self.brings
 
     def at_start(self, scene: Scene) -> Mapping[str, Any]:
@@ -288,9 +288,9 @@ class BodyNames(NameProvider):
         return {**state, **super().at_random(scene, flight, generator)}
 
     def expressions(self, m: Kinematics, names: Collection[str]) -> Mapping[str, Any]:
-        """Those of the states.
+        """Expressions of the states.
 
-        Parameters ``par[..]`` stand for what the state alone doesn't tell: after the sides of the surfaces,
+        Parameters ``par[..]`` stand for what the state alone doesn't give: after the sides of the surfaces,
         the full turns of angles, then the sign of the quaternion, then the second number of the time.
         """
         scaling = m.scaling

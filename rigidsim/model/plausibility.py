@@ -45,7 +45,7 @@ _UPRIGHT = math.cos(0.5)  # of the angle between the spin and the orbit's normal
 _STEADY = math.cos(0.1)  # of the angle between the spin and a principal axis
 _NOTICED = 0.1  # of a resonance's width: a start so far off librates by 0.1 rad
 _SAME = 0.05  # of the miss, by which the spin and a multiple of the mean motion may differ
-_ALIKE = 2e-3  # relative difference of a spin from the orbit's rate, as far as three digits tell
+_ALIKE = 2e-3  # relative difference of a spin from the orbit's rate, as far as three digits show
 
 
 def about_load(load: Load, fields: LoadFields, where: str, scene: Scene) -> Iterator[Caution]:
@@ -107,7 +107,7 @@ def about_named_strength(given: ExactNumber | None, name: str, where: str) -> It
 
 
 def _meant_body(given: ExactNumber) -> KnownBody | None:
-    """The known body that a number means, as far as its digits tell: 4e14 the Earth, 4.001736482e14 none."""
+    """The known body that a number means, as far as its digits show: 4e14 the Earth, 4.001736482e14 none."""
     digits = f"{float(given):.14e}".partition("e")[0].rstrip("0")
     last = 10.0 ** -(len(digits) - 2) / float(digits)  # the last digit, relative
     return _alike(float(given), max(_AS_PUBLISHED, last / 2))

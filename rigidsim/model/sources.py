@@ -190,7 +190,7 @@ class SeenNames(NameProvider):
         return self.values(View.along_motion(m), frozenset(names))
 
     def values(self, view: View, names: frozenset[str]) -> Mapping[str, Any]:
-        """Those of its names that are asked for, or more."""
+        """Values of its names that are asked for, or more."""
         raise NotImplementedError
 
 

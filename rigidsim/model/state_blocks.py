@@ -74,7 +74,7 @@ class AttitudeStates:
     angle_unit: int = 0  # binary exponent of the unit in which such angles are carried, rad
     chord: float | None = None  # rad between attitudes at a small distance of 1, if the same everywhere
     momenta: tuple[str, ...] = ()  # further states of the rotation in the place of the body rates
-    observables: tuple[str, ...] = ()  # recorded by default because the states tell them directly
+    observables: tuple[str, ...] = ()  # recorded by default because they follow from the states directly
 
     @property
     def variables(self) -> list[Symbolic]:

@@ -290,7 +290,7 @@ class System:
 
     @property
     def events(self) -> list[Crossing]:
-        """Those of ``crossings`` that are events of the config."""
+        """The ``crossings`` that are events of the config."""
         return self.crossings[: len(self.scene.events)]
 
     # --- what changes at given times, or is switched --------------------------------------------------------
@@ -340,7 +340,7 @@ class System:
 
     @property
     def _sides(self) -> int:
-        """Number of parameters that tell sides, turns and the sign."""
+        """Number of parameters that give sides, turns and the sign."""
         return len(self.surfaces) + len(self.turning) + bool(self.signed)
 
     @property

@@ -1,7 +1,7 @@
 """Methods, formulations and models that a config can name, and what each can do.
 
 Whoever has to treat them differently asks for an ability here, or in ``rigidsim.solve.solvers`` and
-``rigidsim.model.formulations``, which tell how they solve a scene: never for a name.
+``rigidsim.model.formulations``, which say how they solve a scene: never for a name.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ FORMULATIONS: dict[str, Variables] = {
 
 
 def variables_named(name: str) -> Variables:
-    """Those of a config, summary or dataset; unknown ones (averaged, of a later version) tell an attitude."""
+    """Variables by name; unknown ones (averaged, of a later version) give an attitude."""
     return FORMULATIONS.get(DEFAULT_FORMULATION if name == AUTO else name) or Variables(name, general=False)
 
 

@@ -51,7 +51,7 @@ class FitDataTable(ConfigTable):
     scale: Literal["TDB", "TT", "TAI", "GPS", "UTC"] = "UTC"
     """time scale of dates that don't name theirs"""
     outliers: Annotated[Dimensionless, _ONE_OR_MORE] | None = Field(None, examples=[4])
-    """leave out, and tell, rows with a residual of more than so many standard deviations; by default none"""
+    """leave out and report rows with a residual above so many standard deviations; by default none"""
 
     @field_validator("sigma")
     @classmethod

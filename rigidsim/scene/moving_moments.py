@@ -24,7 +24,7 @@ _JUMPS = re.compile(r"\b(sign|step|pulse|wrap)\s*\(")
 
 
 def least_part(precision: str | int) -> float:
-    """``LEAST`` in a precision that can tell it."""
+    """``LEAST`` in a precision that resolves it."""
     return _LEAST_SINGLE if precision == "single" else LEAST
 
 

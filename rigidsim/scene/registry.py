@@ -48,7 +48,7 @@ class SourceFields(LoadFields):
     """radius of the source, for shadow_NAME and altitude in expressions; the load itself takes a point"""
 
     def placed_by(self, *, free_flight: bool) -> frozenset[str] | None:
-        """Those of a flight, if its source is a body that moves by itself."""
+        """States of a flight, if its source is a body that moves by itself."""
         orbit = getattr(self, "orbit", None)
         relative = free_flight and orbit is not None and orbit.body is not None
         return frozenset({"flight"} if relative else ())

@@ -114,7 +114,7 @@ class Scene(Setting):
         return [*self.acting_formulas(), *(event.expression for event in self.events)]
 
     def never_negative(self) -> list[Expression]:
-        """Those of loads that may not fall below zero."""
+        """Expressions of loads that may not fall below zero."""
         return [formula for load in self.loads for formula in load.never_negative()]
 
     def acting_formulas(self) -> list[Expression]:

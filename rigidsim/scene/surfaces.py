@@ -69,7 +69,7 @@ class Surfaces:
 
     @property
     def parameters(self) -> int:
-        """Number of parameters that tell sides, turns and the sign, at most."""
+        """Number of parameters that give sides, turns and the sign, at most."""
         return len(self.found) + len(self.turning) + self.signed
 
 

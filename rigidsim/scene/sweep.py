@@ -47,7 +47,7 @@ _NO_EXPRESSIONS = {"name", "description", "sweep", "parameters"}
 
 Numbers = tuple[ExactNumber, ...]
 _Values = tuple[int, int, Callable[[int], Any]]
-"""Of an axis: ``count``, ``components`` and ``value``."""
+"""Keys of an axis: ``count``, ``components`` and ``value``."""
 
 
 @dataclass(frozen=True)

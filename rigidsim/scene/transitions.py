@@ -1,7 +1,7 @@
 """Parts of an expression that may change abruptly, which a step must not pass over.
 
 A pulse such as ``exp(-((t-50)/0.01)^2)`` or a switch such as ``tanh((t-5)/0.001)`` is flat almost everywhere:
-its Taylor series tell nothing of what comes, and a step chosen by them passes over it. The change
+its Taylor series show nothing of what comes, and a step chosen by them passes over it. The change
 happens where the function's argument is of order one, and the argument itself isn't flat: see
 ``rigidsim.model.step_limiter``. A root of something that touches zero, such as a vanishing norm, likewise
 continues smoothly along the wrong branch.

@@ -27,7 +27,7 @@ _WORDS = {
     "less_than_equal": "given {given}; at most {le:g} is allowed",
 }
 """Kinds of errors of pydantic, in the words of ``Problem``."""
-_MOST_PROBLEMS = 200  # worth telling; a file of a million wrong keys has said enough by then
+_MOST_PROBLEMS = 200  # worth reporting; a file of a million wrong keys has said enough by then
 
 
 def _what(allowed: Callable[[], list[str]], error: Mapping[str, Any]) -> str:

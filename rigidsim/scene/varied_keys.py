@@ -35,7 +35,7 @@ class VariedKey:
 
     Attributes:
         name: its key with indices from 0, as ``initial.angular_velocity[0]``.
-        unit: its SI unit; "1" for none or one that the config doesn't tell.
+        unit: its SI unit; "1" for none or one that the config doesn't give.
         places: where it stands in the config; empty for a component of ``initial.attitude``.
         number: its value, SI.
         size: of numbers beside it, for what is small against it where it is zero.

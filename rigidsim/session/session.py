@@ -535,7 +535,7 @@ def storage(prepared: InitialValueProblem, place: Path) -> Storage:
         segments=samples * row,
         dataset=samples * row * _SHRINK,
         timeline=shown * _TIMELINE_ROW_BYTES,
-        free=disk.free + float(replaced) if disk.total else math.inf,  # one without a size can't tell
+        free=disk.free + float(replaced) if disk.total else math.inf,  # one without a size can't say
     )
 
 

@@ -19,7 +19,7 @@ from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.precision import Precision
 
 _ROUGH = 1e-2
-"""Tolerance of the trial: low orders tell whether there is a series."""
+"""Tolerance of the trial: low orders show whether there is a series."""
 
 
 def refuse_non_finite_start(system: System, precision: Precision) -> None:

@@ -88,7 +88,7 @@ class FromStates(AnyStart):
         if not self.plain:
             raise NotFromStates("its equations change along the motion (tables, kernels or switches)")
         if self._system.mechanics.rate_correction is not None:
-            raise NotFromStates("its body is distorted, so that rates alone don't tell its momentum")
+            raise NotFromStates("its body is distorted, so that rates alone don't determine its momentum")
 
     @cached_property
     def _scales(self) -> np.ndarray:

@@ -13,7 +13,7 @@ The mean of Y tends to 2 for quasi-periodic motion and grows like half the large
 By parts, int t g' dt = t g(t) - int g dt, so that no derivative of g is needed; the integrals are taken by
 the trapezoid rule over the samples, added in their order: ``sum`` would add those of a single motion in
 another order than those of many, and a member's bits would depend on who is beside it. Several samples a
-period make the value good to a few per cent; to tell order from chaos one an orbit will do.
+period make the value good to a few per cent; to separate order from chaos one an orbit will do.
 """
 
 from typing import NamedTuple

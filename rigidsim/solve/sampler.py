@@ -206,7 +206,7 @@ class SampleBuffer:
 
     def took(self, work: str, rows: int, seconds: float) -> None:
         """Adapt how many samples may wait to what each kind of work gets done in the time of a chunk."""
-        if rows < _FEWEST_ROWS:  # they tell little about the cost of a row
+        if rows < _FEWEST_ROWS:  # they say little about the cost of a row
             return
         pacing = self._pacing
         self._affordable[work] = int(rows * pacing.chunk_seconds / max(seconds, 1e-9))

@@ -1,5 +1,5 @@
 """What takes natural steps through a motion, the boundaries between them, and bounds of steps for cases in
-which the engine, which uses the last two terms of a series, can't tell.
+which the engine, which uses the last two terms of a series, can't choose them.
 """
 
 from __future__ import annotations

@@ -75,7 +75,7 @@ class Derivatives:
 
     @classmethod
     def of(cls, system: System) -> Derivatives:
-        """Of a system as it is, without coefficients that vary."""
+        """Derivatives of a system as it is, without coefficients that vary."""
         return cls(system, [right for _, right in system.equations], first=parameters_of(system))
 
     def felt(self, begun: Collection[int]) -> list[int]:

@@ -158,7 +158,7 @@ class JoinedAngles:
         return bool(self.variables)
 
     def rows(self, clock: SampleClock) -> Rows:
-        """The samples, and as many rows between them as tell turns."""
+        """The samples, and as many rows between them as turns need."""
         radians = 0.0 if self.lost else self._radians
         return Rows(clock, math.ceil(radians / DENSE))
 
@@ -279,7 +279,7 @@ class JoinedAngles:
         return found
 
     def _doubtful(self, jumps: np.ndarray, angles: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-        """Rows whose turns the row before doesn't tell because an angle is near its pole."""
+        """Rows whose turns the row before doesn't determine because an angle is near its pole."""
         found = np.zeros(len(jumps), dtype=bool)
         large = np.abs(jumps) > _DOUBTFUL
         for variable in self.variables:
@@ -302,7 +302,7 @@ class JoinedAngles:
     def _looked_at(
         self, begin: float, state: np.ndarray, chart: int, end: float, jump: np.ndarray, depth: int = _DEPTH
     ) -> np.ndarray:
-        """Change of the angles (angles,) between two moments, of which their values don't tell it."""
+        """Change of the angles (angles,) between two moments, where their values don't determine it."""
         times = np.linspace(begin, end, _PARTS + 1)
         states = self._path(times, state, chart)
         if states is None:
@@ -316,7 +316,7 @@ class JoinedAngles:
 
     def _path(self, times: np.ndarray, state: np.ndarray, chart: int) -> np.ndarray | None:
         """States (n, states) at ascending times from the state at the first on; None if the motion doesn't
-        get there, or depends on turns that this state doesn't tell.
+        get there, or depends on turns that this state doesn't determine.
         """
         if self._system.turning or not times[-1] > times[0]:
             return None

@@ -129,6 +129,6 @@ def sink(path: Path) -> Iterator[Sink]:
         try:
             yield opened
         except Exception:
-            opened.check()  # HDF5's own errors on dropped data tell nothing new
+            opened.check()  # HDF5's own errors on dropped data add nothing
             raise
     opened.check()

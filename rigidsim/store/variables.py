@@ -30,7 +30,7 @@ that loads see, and the keys of sensitivities.
 """
 
 SCHEMA_VERSION = 4
-"""That of all of 1.x. Versions before were never released; files of any other version are refused."""
+"""Of all versions 1.x. Earlier versions were never released; files of any other version are refused."""
 
 
 @dataclass(frozen=True)

@@ -101,7 +101,7 @@ class Tangents:
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Their SI units; "1" for none or one that the config doesn't tell."""
+        """Their SI units; "1" for none or one that the config doesn't give."""
         return tuple(key.unit for key in self._parametrised.keys)
 
     @property

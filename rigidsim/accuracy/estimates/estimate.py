@@ -6,7 +6,7 @@ are singular somewhere, the same motion in quaternions, which round far less. El
 errors is measured by tangents, kicked as each step's rounding does (``rigidsim.solve.error_tangents``).
 
 A run of some ten thousand steps is followed to its end, of a longer one the beginning; the whole where errors
-grow faster there than a law could tell, or where ``accuracy`` was asked for.
+grow faster there than a law could predict, or where ``accuracy`` was asked for.
 
 With the assumptions below the errors of the campaign's scenes are covered as ``experiments/README.md`` shows
 (``experiments/error_coverage.py``).

@@ -24,7 +24,7 @@ def print_comparison(found: Comparison) -> None:
     undecided = found.convention.undecided
     if undecided:
         more = f", and {len(undecided) - _MOST_UNDECIDED} more" if len(undecided) > _MOST_UNDECIDED else ""
-        on.line("or", "; ".join(undecided[:_MOST_UNDECIDED]) + more + ": this motion can't tell")
+        on.line("or", "; ".join(undecided[:_MOST_UNDECIDED]) + more + ": this motion can't decide")
     error = found.attitude_error
     rows: list[list[Styled]] = [
         [

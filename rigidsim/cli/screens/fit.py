@@ -48,7 +48,7 @@ def print_fit(found: FitResult) -> None:
 
 
 def _tell_correlations(on: Page, found: FitResult) -> None:
-    """Pairs that are nearly one: what the data tell of them together is more than of each."""
+    """Pairs that are nearly one: the data determine them together better than each."""
     pairs = []
     for i, row in enumerate(found.correlations):
         for j, value in enumerate(row[:i]):

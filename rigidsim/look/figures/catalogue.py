@@ -86,7 +86,7 @@ def _beginning(shown: Shown, plot: Plot) -> float:
         if len(values) < 50 or not moves(values):
             continue
         changes = int(np.count_nonzero(np.diff(np.signbit(values - values.mean()))))
-        if changes < _TELLING * len(values):  # else samples too sparse to tell swings from a pattern
+        if changes < _TELLING * len(values):  # else samples too sparse to separate swings from a pattern
             most = max(most, changes)
     if length <= 0 or most / 2 * span / length <= _MANY:
         return 0.0

@@ -61,7 +61,7 @@ class Axis:
 
     @classmethod
     def of(cls, dataset: xarray.Dataset, dim: str) -> "Axis":
-        """That of a dimension."""
+        """The axis of a dimension."""
         words, count = dim.replace("_", " "), dataset.sizes[dim]
         values = next((dataset[name] for name in (f"{dim}_value", dim) if name in dataset.coords), None)
         zipped = [c for c in dataset.coords.values() if c.dims == (dim,) and "swept_key" in c.attrs]

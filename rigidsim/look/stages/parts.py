@@ -159,7 +159,7 @@ class Cone:
 
     @property
     def rims(self) -> list[Array]:
-        """Its rim, and of a double cone that of the other side."""
+        """Its rim, and of a double cone the other side's rim."""
         return [self.rim, -self.rim] if self.double else [self.rim]
 
 
@@ -202,7 +202,7 @@ class Stage:
 @dataclass(frozen=True)
 class Picture:
     """Everything in three dimensions that is drawn of a dataset: the kind of scene in words, the body's stage
-    first, notes on scales for a page, and plots that tell of what is on the stage alone.
+    first, notes on scales for a page, and plots that show what is on the stage alone.
     """
 
     kind: str

@@ -48,8 +48,8 @@ class AxisUncertainty:
 
     @classmethod
     def of(cls, axis: Array, attitude: Array, covariance: Array) -> "AxisUncertainty":
-        """That of an axis (3,), body axes, by attitudes (rows, 3, 3), body to space, and the covariances
-        (rows, 3, 3) of these as rotation vectors in space axes.
+        """The uncertainty of an axis (3,), body axes, by attitudes (rows, 3, 3), body to space, and their
+        covariances (rows, 3, 3) as rotation vectors in space axes.
         """
         first, second = signals.across(axis)
         moved = np.stack([second, -first, axis])  # a x u, a x v, and about a

@@ -108,7 +108,7 @@ def build_comparison(
     ]
     for found in (found for found in common.values() if found[0].place == "drift"):
         curves = sum(len(plot.labels) + len(plot.levels) for plot in found)
-        views.append(plot_view(found, clock, named=curves <= _CURVES))  # leading plots tell the colours, too
+        views.append(plot_view(found, clock, named=curves <= _CURVES))  # leading plots name the colours, too
     left = left_side(
         scene,
         entities.legend_of([stage for run in runs for stage in run.picture.stages]),

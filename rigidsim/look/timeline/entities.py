@@ -1,8 +1,8 @@
 """Stages, plots, plane figures, states, the legend and the clock as rerun entities: static parts, and columns
 of what changes.
 
-Meshes are given no normals: the viewer then shows their own colours from all sides, and edges tell the faces
-apart.
+Meshes are given no normals: the viewer then shows their own colours from all sides, and edges separate
+the faces.
 """
 
 from collections.abc import Iterable, Sequence

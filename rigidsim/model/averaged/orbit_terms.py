@@ -174,7 +174,7 @@ class OrbitTerms:
 
     @classmethod
     def of_elements(cls, states: ElementStates, number: Rounder) -> Self:
-        """Those of a tabulated orbit."""
+        """Terms of a tabulated orbit."""
         value = {name: rounded(x) for name, x in states.values.items()}
         k, h, axis, place = value["k"], value["h"], value[AXIS], None
         square = k * k + h * h

@@ -62,7 +62,7 @@ class Wobble:
 
     @classmethod
     def of(cls, motion: FreeMotion, direction: Vector | None = None) -> "Wobble":
-        """That of a free motion, SI, from where the momentum has this direction (unit, body axes)."""
+        """The wobble of a free motion, SI, from where the momentum has this direction (unit, body axes)."""
         first, transverse, axial = (float(motion.momentum * x) for x in motion.amplitudes)
         amplitude = 0.0
         if direction is not None and transverse != 0:

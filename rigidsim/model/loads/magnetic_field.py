@@ -174,7 +174,7 @@ class UniformField:
         return self.placement is NOWHERE
 
     def size(self, scene: Scene) -> Any:
-        """Of its order, T (mpf)."""
+        """Order of its size, T (mpf)."""
         return norm(scene.context, self.source)
 
     def most(self, scene: Scene) -> Any:
@@ -192,7 +192,7 @@ class UniformField:
 
 
 class DipoleField(UniformField):
-    """Of a centred dipole M, B = (mu_0 / 4 pi r^3) (3 (M . c) c - M) in direction c (Jackson, Classical
+    """A centred dipole M, B = (mu_0 / 4 pi r^3) (3 (M . c) c - M) in direction c (Jackson, Classical
     Electrodynamics, section 5.6).
     """
 

@@ -100,7 +100,7 @@ class MassLoss(Load):
         return states_read(self.rate)
 
     def torque(self, m: Kinematics) -> list[Term]:
-        """Refused beside a weight, whose torque is that of a constant mass."""
+        """Refused with a weight, whose torque is for a constant mass."""
         context, scaling = m.scene.context, m.scaling
         if m.scene.torque_arm is not None:
             what = "given with uniform_gravity on a body that is held off its centre of mass, whose weight "

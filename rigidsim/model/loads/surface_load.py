@@ -191,7 +191,7 @@ class Pushes:
         return tuple(push for push in self._found if push.turns or self.around.free_flight)
 
     def surfaces(self) -> Iterator[tuple[int, OuterSurface]]:
-        """Those of the body, counted from 1; refused if there are none."""
+        """Surfaces of the body, counted from 1; refused if there are none."""
         body = self.around.body
         if not body.surfaces:
             what = "given for a body without surfaces; give [[body.surfaces]], such as normal and area of a "

@@ -77,7 +77,7 @@ class KeplerParts:
 
     @classmethod
     def at(cls, orbit: KeplerOrbit, context: Any, time: Any) -> KeplerParts:
-        """Those of a time in s; numbers are mpf, SI."""
+        """Parts at a time in s; numbers are mpf, SI."""
         e, anomaly = orbit.eccentricity, orbit.eccentric_anomaly(context, time)
 
         def turned(angle: Any, rate: Any) -> tuple[Any, Any, Any]:
@@ -390,7 +390,7 @@ class TablePieces:
         for row, time in reversed(inner) if self._back else inner:
             if time <= start if self._back else time > start:
                 knot = number(scaling.internal(time, orbit.context))
-                if self.knots and knot == self.knots[-1]:  # rows that the precision can't tell apart
+                if self.knots and knot == self.knots[-1]:  # rows that the precision can't distinguish
                     self._pieces[-1] = row - self._back
                 else:
                     self.knots.append(knot)

@@ -157,7 +157,7 @@ class PlacedByKernel(Placement):
 
 
 def _rate(times: np.ndarray, otherwise: float) -> float:
-    """Mean rate (rad/s) of what comes round at given times; too few of them tell none."""
+    """Mean rate (rad/s) of what comes round at given times; none if they are too few."""
     return 2 * np.pi * (len(times) - 1) / float(times[-1] - times[0]) if len(times) > 2 else otherwise
 
 

@@ -53,7 +53,7 @@ class Preset:
 
     @classmethod
     def of(cls, table: Mapping[str, Any]) -> Preset:
-        """Of its file's table: tables within are those of ``[body]``."""
+        """The preset of its file's table, whose inner tables are tables of ``[body]``."""
         tables = {key: value for key, value in table.items() if isinstance(value, dict)}
         own = {key: value for key, value in table.items() if key not in tables}
         lists = {key: tuple(value) for key, value in own.items() if isinstance(value, list)}

@@ -56,7 +56,7 @@ class NotBatchable(Enum):
 
 
 def batchable(experiment: Experiment, keys: Sequence[str]) -> NotBatchable | None:
-    """Why members can't run in a batch, as far as experiment and swept keys tell; None if they can."""
+    """Why members can't run in a batch, as far as experiment and swept keys show; None if they can."""
     config = experiment.config
     integrator = config.integrator
     asked = integrator.accuracy, integrator.accuracy_axis, integrator.accuracy_position

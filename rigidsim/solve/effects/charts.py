@@ -44,7 +44,7 @@ NEAR = 0.5
 _SWING = math.pi / 2  # of the outer angles within a step, from which the step is examined in parts
 _HALVINGS = 10  # of a step at most; the remainder is a straight line to 1e-4 of its length
 _STRAIGHT = math.pi - 2.0**-7  # swing in such a part from which it passed straight through
-_NEAR_POLE = 2.0**-20  # singular factor below which a reference doesn't tell its branch
+_NEAR_POLE = 2.0**-20  # singular factor below which a reference doesn't fix its branch
 _TURN = 2 * math.pi
 
 

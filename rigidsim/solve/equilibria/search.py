@@ -195,7 +195,7 @@ class Newton:
         )
 
     def settled(self, at: Any, slope: Matrix | None = None) -> Any:
-        """Follow steps from a point until they gain no more: a zero, as far as the residual's bits tell.
+        """Follow steps from a point until they gain no more: a zero, as far as the residual's bits show.
 
         Args:
             slope: the Jacobian near the point, if it is known.

@@ -627,7 +627,7 @@ class SwitchingStepper(TaylorStepper):
         for off, earlier, later in self._moments.passed(knot):
             changed = [j for j, side in later.items() if side != earlier[j]]
             if changed and self._unresolved(off, earlier, later):
-                what = f"two numbers of {self.precision.name} precision don't tell its impulse"
+                what = f"two numbers of {self.precision.name} precision don't resolve its impulse"
                 return self._fail(changed[0], f"something so strong changes that {what}", _NOT_RESOLVED)
         self._take_known_sides()
         self._crossed = self._moments.timed[0] + 1 if self._moments.timed else 0

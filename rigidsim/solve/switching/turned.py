@@ -1,6 +1,6 @@
 """Full turns of Euler angles, and the quaternion's sign, which expressions may read.
 
-The state alone doesn't tell them: both are continued from step to step, and are parameters of the equations.
+The state alone doesn't give them: both are continued from step to step, and are parameters of the equations.
 """
 
 from __future__ import annotations

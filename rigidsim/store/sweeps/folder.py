@@ -178,7 +178,7 @@ class FittedOfMembers(SummaryPart):
 
 
 class SweepSummary(SummaryPart):
-    """Contents of a sweep's ``summary.json``; of an unfinished one, what its tiles tell.
+    """Contents of a sweep's ``summary.json``; of an unfinished one, what its tiles say.
 
     Attributes:
         members_done, tiles, tiles_done, members_per_second, seconds_left: of an unfinished sweep alone.
@@ -224,7 +224,7 @@ class SweepSummary(SummaryPart):
 
 @dataclass(frozen=True, repr=False)
 class SavedSweep:
-    """A sweep on disk, finished or not; of an unfinished one, ``outcome`` is what its tiles tell."""
+    """A sweep on disk, finished or not; of an unfinished one, ``outcome`` is what its tiles say."""
 
     folder: SweepFolder
     outcome: SweepSummary
@@ -308,7 +308,7 @@ def open_sweep(path: str | Path) -> SavedSweep:
 
 
 def _so_far(folder: SweepFolder) -> SweepSummary:
-    """The summary; for an unfinished sweep, what its tiles tell."""
+    """The summary; for an unfinished sweep, what its tiles say."""
     try:
         summary = SweepSummary.model_validate(folder.read_summary())
     except ValidationError as error:

@@ -55,7 +55,7 @@ class Convention:
         offset: "none", "space" or "body": which axes differ from the experiment's, by a constant turn.
         offset_angle: of that turn, rad. offset_quaternion: w x y z, applied to the trajectory's attitudes
             from the left (space) or from the right (body).
-        undecided: other conventions that this motion can't tell from this one.
+        undecided: other conventions that this motion can't distinguish from this one.
     """
 
     order: str = ""

@@ -184,7 +184,7 @@ class Evidence:
         return RowStates(equations, equations.motion(self.times), self.quaternions, rates, flight)
 
     def drifts(self) -> dict[str, np.ndarray]:
-        """Of the invariants by the file alone, relative, (rows,) each."""
+        """Drifts of the invariants by the file alone, relative, (rows,) each."""
         if self.states is None:
             return {}
         found = {} if self.rates is None else self.states.equations.drifts(self.states, self.times)
@@ -219,13 +219,13 @@ class Evidence:
         return starts, np.linalg.norm(turns, axis=1), np.linalg.norm(slips, axis=1)
 
     @property
-    def slip(self) -> float:
+    def rate_gap(self) -> float:
         """Difference of the first rates, rad/s."""
         return 0.0 if self.rate_errors is None else float(self.rate_errors[0])
 
     @cached_property
     def windows(self) -> defects.WindowDefects | None:
-        """Of attitudes with rates; None where rows are too few or too far apart."""
+        """Defects of attitudes with rates; None where rows are too few or too far apart."""
         if self.rates is None or self.states is None:
             return None
         equations = self.states.equations
@@ -301,19 +301,19 @@ def judged(seen: Evidence) -> Verdict:
         return (_elsewhere_alone(seen, alone) if alone else None) or _by_attitudes(seen, alone)
     return (
         _contradiction(seen, windows)
-        or _elsewhere(seen, seen.slip, windows.attitude, windows.rates, windows.length)
+        or _elsewhere(seen, seen.rate_gap, windows.attitude, windows.rates, windows.length)
         or _by_rates(seen, windows)
         or _by_attitudes(seen, seen.alone)
     )
 
 
 def _agreement(seen: Evidence) -> Verdict | None:
-    """Of attitudes that are the experiment's; None for others."""
+    """The verdict on attitudes that are the experiment's; None for others."""
     floor, reason = seen.floor
     if seen.errors.max() > floor:
         return None
-    slip = 0.0 if seen.rate_errors is None else float(seen.rate_errors.max())
-    agree = seen.rates is None or slip <= 4 * seen.rate_noise + _AGREE * floor * seen.rate
+    rate_gap = 0.0 if seen.rate_errors is None else float(seen.rate_errors.max())
+    agree = seen.rates is None or rate_gap <= 4 * seen.rate_noise + _AGREE * floor * seen.rate
     if agree and (seen.rates is not None or seen.turn < np.pi):
         return AGREES, reason
     if seen.turn >= np.pi:
@@ -324,16 +324,16 @@ def _agreement(seen: Evidence) -> Verdict | None:
         )
     return INCONSISTENT_RATES, (
         f"its attitudes are the experiment's, but they don't turn at its rates, which differ by "
-        f"up to {slip:.3g} rad/s, at a motion of {seen.rate:.3g} rad/s"
+        f"up to {rate_gap:.3g} rad/s, at a motion of {seen.rate:.3g} rad/s"
     )
 
 
 def _contradiction(seen: Evidence, windows: defects.WindowDefects) -> Verdict | None:
-    """Of rates that aren't those at which the attitudes turn; None for others."""
+    """The verdict on rates at which the attitudes don't turn; None for others."""
     missed = windows.unexplained / windows.length
-    slip = seen.slip
-    moved = slip > max(_ABOVE * seen.rate_noise, seen.floor[0] * seen.rate)
-    if missed <= _NO_RATES * seen.rate and not (moved and slip / _SAME < missed < slip * _SAME):
+    rate_gap = seen.rate_gap
+    moved = rate_gap > max(_ABOVE * seen.rate_noise, seen.floor[0] * seen.rate)
+    if missed <= _NO_RATES * seen.rate and not (moved and rate_gap / _SAME < missed < rate_gap * _SAME):
         return None
     return INCONSISTENT_RATES, (
         f"its attitudes don't turn at its rates: these miss {missed:.3g} rad/s, at a motion of "
@@ -341,26 +341,26 @@ def _contradiction(seen: Evidence, windows: defects.WindowDefects) -> Verdict | 
     )
 
 
-def _elsewhere(seen: Evidence, slip: float, attitude: float, rates: float, length: float) -> Verdict | None:
-    """Of another start, which outweighs defects (rad, rad/s) over windows of a length (s)."""
+def _elsewhere(seen: Evidence, gap: float, attitude: float, rates: float, length: float) -> Verdict | None:
+    """The verdict on another start, which outweighs defects (rad, rad/s) over windows of a length (s)."""
     angle, floor = float(seen.errors[0]), seen.floor[0]
     collected = seen.span / length * (attitude + rates * seen.span)
     noise = seen.rate_noise + seen.attitude_noise / length
-    if angle <= floor and slip <= max(_ABOVE * noise, floor * seen.rate):
+    if angle <= floor and gap <= max(_ABOVE * noise, floor * seen.rate):
         return None
-    if angle + slip * seen.span <= _START * collected:
+    if angle + gap * seen.span <= _START * collected:
         return None
-    apart = f"{angle:.3g} rad and {slip:.3g} rad/s apart"
+    apart = f"{angle:.3g} rad and {gap:.3g} rad/s apart"
     return UNDECIDED, f"it starts elsewhere, {apart}, which outweighs what its equations miss on the way"
 
 
 def _elsewhere_alone(seen: Evidence, windows: WindowsOfAttitudes) -> Verdict | None:
-    """Of attitudes alone whose first rates differ, where their defects are nothing."""
-    slip = float(np.linalg.norm(windows.rates[0] - seen.own_rates[windows.rows[0, 0]]))
+    """The verdict on attitudes alone whose first rates differ, where their defects are nothing."""
+    rate_gap = float(np.linalg.norm(windows.rates[0] - seen.own_rates[windows.rows[0, 0]]))
     size, length = windows.size, windows.length
-    if slip * length <= _SURE * size and seen.errors[0] <= seen.floor[0]:
+    if rate_gap * length <= _SURE * size and seen.errors[0] <= seen.floor[0]:
         return None
-    return _elsewhere(seen, slip, size, size / length, length)
+    return _elsewhere(seen, rate_gap, size, size / length, length)
 
 
 def _by_rates(seen: Evidence, windows: defects.WindowDefects) -> Verdict | None:
@@ -390,7 +390,7 @@ def _by_attitudes(seen: Evidence, windows: WindowsOfAttitudes | None) -> Verdict
     if windows.size <= _ABOVE * noise:
         return UNDECIDED, (
             f"local defects ({windows.size:.2g} rad) are within the digits of the file ({noise:.2g} rad); "
-            "write more digits to tell a model from an integration"
+            "write more digits to separate a model from an integration"
         )
     share, left = windows.unexplained / windows.size, windows.unexplained
     left_by_fits = f"of the attitudes' defects ({windows.size:.2g} rad) other moments or steady torques leave"

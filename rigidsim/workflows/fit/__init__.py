@@ -1,1 +1,1 @@
-"""``rigidsim fit``: parameters of an experiment estimated from observations, and what these can't tell."""
+"""``rigidsim fit``: parameters of an experiment estimated from observations, and what stays undetermined."""

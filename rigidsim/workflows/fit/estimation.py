@@ -40,7 +40,7 @@ class Linear:
 
     Attributes:
         residuals: (rows,) observed less computed. slopes: (rows, estimated). considered: (rows, considered).
-        noise: (estimated,) norms of columns below which they tell nothing.
+        noise: (estimated,) norms of columns below which they are rounding.
         pull: (estimated,) prior value less value. weights: (estimated,) 1/sigma of the prior; 0 for none.
         sets: of each set of observations the residuals in SI, (rows, components), used or not.
     """

@@ -42,7 +42,7 @@ class Prediction:
         values: by variable, (times, components), SI; quaternions for attitudes.
         slopes: by variable, (times, components, numbers) derivatives; of attitudes by rotation vectors in
             space axes, rad, (times, 3, numbers).
-        noise: by variable, (numbers,): of slopes, below which they tell nothing.
+        noise: by variable, (numbers,): of slopes, below which they are rounding.
     """
 
     values: dict[str, np.ndarray]

@@ -59,7 +59,7 @@ class FittedParameter(SummaryPart):
 
 
 class Undetermined(SummaryPart):
-    """Numbers that the data can't tell from one another, or at all.
+    """Numbers that the data can't separate, or don't determine at all.
 
     Attributes:
         keys: those that take part. amounts: by how much each changes along the direction, SI: the data

@@ -1,6 +1,6 @@
 """Effects that a scene can be without: each load and rotor, what ``[body]`` brings, and parts of these.
 
-Loads tell their parts themselves (``SceneLoad.effect_parts``); a load that has none needs to tell nothing.
+Loads list their parts themselves (``SceneLoad.effect_parts``); a load without parts lists none.
 """
 
 from __future__ import annotations

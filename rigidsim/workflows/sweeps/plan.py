@@ -107,7 +107,7 @@ def _worked_out(sweep: Sweep, most: int, *, equations: bool = False) -> list[Pro
 
 
 def _shares(sweep: Sweep, each: Each) -> Iterable[Share]:
-    """Which members no run accepts, if members share equations so that their numbers alone tell."""
+    """Which members no run accepts, if members share equations so that their numbers alone decide."""
     if why_alone(sweep, ()) not in ("", "wall_time", "asked"):
         return []
     edges = [*range(0, sweep.count, _AT_ONCE), sweep.count]
