@@ -108,7 +108,7 @@ def test_pulses_beyond_two_numbers_are_refused_with_the_reason() -> None:
     torque = "pulse(t, 700.3, 700.3 + 1e-40)*1e40"
     summary = run_text(LATE.format(torque=torque, precision="double")).summary
     assert summary["status"] == "stopped: switching unresolved"
-    assert "two numbers of double precision don't tell its impulse" in summary["message"]
+    assert "two numbers of double precision don't resolve its impulse" in summary["message"]
 
 
 @pytest.mark.parametrize("torque", ["exp(-((t - 700.3)/(2^-48))^2)/(2^-48)", "1/cosh(t - 700.3)^2"])
