@@ -325,7 +325,7 @@ class ReferenceSolution(NamedTuple):
 
 
 def _references(plan: Plan, found: Mapping[Task, Answer]) -> tuple[ReferenceSolution, ReferenceSolution]:
-    """The reference, and that of quadruple precision. Raises ``RigidsimError`` if there is none."""
+    """The reference, and the reference of quadruple precision. Raises ``RigidsimError`` if there is none."""
     if plan.exact and (exact := _attitudes(found, plan.references()[0])) is not None:
         own = np.full(len(plan.times), 10.0 ** (2 - LEAST_DIGITS))  # two digits are left to rounding
         best = ReferenceSolution(exact, own, f"closed form to {LEAST_DIGITS} digits")

@@ -40,7 +40,7 @@ def _differences(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.n
 
 
 def rotation_vectors(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.ndarray:
-    """Rotation vectors (n, 3), rad, from the attitudes of one motion to those of another, in the body axes of
+    """Rotation vectors (n, 3), rad, from the attitudes of one motion to another's, in the body axes of
     the first; of directions the smallest rotations, in space axes, that take one to the other.
 
     Args:
@@ -53,7 +53,7 @@ def rotation_vectors(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> 
     pairs = zip_longest(one, other, fillvalue=np.zeros_like(first))
     apart = np.sum([sign * b - a for a, b in pairs], axis=0)
     sine = np.cross(first[:, -3:], apart[:, -3:])
-    if first.shape[1] == 4:  # vector part of conj(q) dq; that of conj(q) q is zero
+    if first.shape[1] == 4:  # vector part of conj(q) dq; conj(q) q has none
         sine = first[:, :1] * apart[:, 1:] - apart[:, :1] * first[:, 1:] - sine
     size = np.linalg.norm(sine, axis=1)
     angle = turns * np.arctan2(size, 1.0 + np.einsum("ij,ij->i", first, apart))

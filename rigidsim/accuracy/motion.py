@@ -153,7 +153,7 @@ _CLEARLY = 0.01  # error of a reference with many digits, over the accuracy or t
 
 
 def scatter_of(setting: Setting, steps: float) -> float:
-    """Ratio of two settings' errors over that of their errors per step, after so many steps: more per square
+    """Ratio of two settings' errors over the ratio per step, after so many steps: more per square
     root of these if truncation errors add up while rounding errors walk at random.
     """
     return 100.0 if setting.tolerance is None else 100.0 + 10.0 * math.sqrt(steps)

@@ -39,7 +39,7 @@ class _Raw:
 
     @property
     def factor(self) -> int:
-        """Ratio of a cosine's amplitude to that of its exponential: 2 for real signals, otherwise 1."""
+        """Ratio of a cosine's amplitude to its exponential's: 2 for real signals, otherwise 1."""
         return 2 if self.signal.real else 1
 
 

@@ -195,7 +195,7 @@ def _gram(total: Sum, order: int) -> Complexes:
 
 
 def error_growth(total: Sum, order: int) -> Reals:
-    """Factor by which the error of each column's coefficient exceeds that of a column on its own."""
+    """Factor by which the error of each column's coefficient exceeds a lone column's."""
     matrix = _gram(total, order)
     if not len(matrix):
         return np.empty(0)

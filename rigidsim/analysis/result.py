@@ -114,7 +114,7 @@ class Analysis:
     title: str
 
     def __getitem__(self, name: str) -> SignalAnalysis:
-        """The analysis of a signal by its name, or by that of a variable with just one signal."""
+        """The analysis of a signal by its name, or by the name of a variable with just one signal."""
         found = [s for s in self.signals if name in (s.name, s.name.split(".")[0])]
         if len(found) != 1:
             raise KeyError(f"{name!r}; there are {', '.join(s.name for s in self.signals)}")

@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def _command(module: str, more: str = "") -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Make arguments and docstring those of a command, done by a module of ``rigidsim.cli.commands``."""
+    """Take arguments and docstring from a command, done by a module of ``rigidsim.cli.commands``."""
 
     def declared(function: Callable[..., None]) -> Callable[..., None]:
         name = function.__name__

@@ -110,7 +110,7 @@ def wobble_aliased(dataset: xarray.Dataset) -> bool:
 
 
 def axis_names(dataset: xarray.Dataset) -> list[str]:
-    """Names of the principal axes: those of body axes, or 1, 2, 3 if they aren't body axes."""
+    """Names of the principal axes: names of body axes, or 1, 2, 3 if they aren't body axes."""
     axes = np.abs(scene_of(dataset).axes)
     along = np.abs(axes.max(axis=1) - 1) < 1e-9
     return ["xyz"[k] for k in axes.argmax(axis=1)] if along.all() else ["1", "2", "3"]

@@ -71,7 +71,7 @@ def angle_scale(values: Array) -> tuple[float, str]:
 
 
 def angle_text(value: float, digits: int = 4, *, like: float | None = None) -> str:
-    """An angle in rad with its unit, or that of another: ``206.3 mas``, ``23.44°``."""
+    """An angle in rad with its unit, or another's unit: ``206.3 mas``, ``23.44°``."""
     divisor, unit = angle_scale(np.array([value if like is None else like]))
     symbol = ANGLE_UNITS[unit].symbol if unit in ANGLE_UNITS else unit
     return f"{number(value / divisor, digits)}{'' if symbol in '°″' else ' '}{symbol}"

@@ -79,7 +79,7 @@ def refuse_without_plane(scene: Scene, loads: Sequence[Load]) -> None:
 
 
 def flies_in_plane(scene: Scene, loads: Sequence[Load]) -> bool:
-    """Whether the plane is that of the body's own flight."""
+    """Whether the plane is the plane of the body's own flight."""
     return scene.reference is None and _orbit_plane(loads).flown
 
 
@@ -191,7 +191,7 @@ def first_source(loads: Iterable[Load]) -> Load | None:
 
 
 def flies_about_source(scene: Scene) -> bool:
-    """Whether the source's direction is that of the body's own flight."""
+    """Whether the source's direction follows from the body's own flight."""
     load = first_source(loads_of(scene))
     plane = plane_of(load)
     return plane is not None and plane.flown

@@ -3,7 +3,7 @@
 All right-hand sides of the rates come from ``accelerations``. A tensor that varies is another class with the
 same members; its ``change`` is dI/dt along the motion.
 
-The tensor that turns is that of the equations of motion. It differs from the one of the mass distribution,
+The tensor that turns is the one in the equations of motion. It differs from the one of the mass distribution,
 which a gravity gradient feels, by what turns on a bearing (``rigidsim.scene.scene.Scene.turning_inertia``).
 """
 

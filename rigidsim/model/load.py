@@ -94,7 +94,7 @@ class Load(SceneLoad):
     unaveraged: tuple[str, str] | None = None
 
     def __init_subclass__(cls) -> None:
-        """Loads of users speak SI; those of rigidsim are in internal units."""
+        """Loads of users are in SI; rigidsim's loads are in internal units."""
         super().__init_subclass__()
         if not cls.__module__.startswith("rigidsim."):
             speaks_si(cls)

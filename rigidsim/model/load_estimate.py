@@ -43,7 +43,7 @@ _TETRAHEDRAL = np.concatenate([np.eye(4), [[0.5, *signs] for signs in product((-
 """Rotations of a tetrahedron: over them, functions of first and second order of the attitude average out."""
 _OBLIQUE = np.array([[0.8, 0.4, -0.2, 0.4], [0.5, -0.1, 0.7, -0.5], [0.3, 0.9, 0.1, 0.3]])
 _OBLIQUE /= np.linalg.norm(_OBLIQUE, axis=1)[:, None]
-"""Rotations applied before those of the tetrahedron: charts of the attitude are singular or symmetric in
+"""Rotations applied before the tetrahedron's: charts of the attitude are singular or symmetric in
 special places.
 """
 _STATES = 2 * (1 + len(_TETRAHEDRAL) * len(_OBLIQUE))

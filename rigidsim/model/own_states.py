@@ -161,7 +161,7 @@ def _sizes(scene: Scene, scaling: Scaling) -> dict[str, Any]:
 
 
 def _alike(scene: Scene, scaling: Scaling) -> list[tuple[dict[str, Any], dict[str, Any]]]:
-    """Values of all names, and those of user-defined states: at the start, and as parts of their sizes at any
+    """Values of all names and of user-defined states: at the start, and as parts of their sizes at any
     attitude, rates as large as they become, and times that don't depend on the run's end.
     """
     context, generator = scene.context, random.Random(0)

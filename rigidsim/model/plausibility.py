@@ -94,7 +94,7 @@ def _about_strength(given: ExactNumber, distance: float, where: str) -> Iterator
 
 
 def about_named_strength(given: ExactNumber | None, name: str, where: str) -> Iterator[Caution]:
-    """A G M given for a body that is named: in km^3/s^2 without a unit, or that of another known body."""
+    """A G M given for a body that is named: in km^3/s^2 without a unit, or another known body's."""
     body = _named(name)
     if body is None or given is None:
         return
@@ -227,7 +227,7 @@ def _familiar_axis(given: ExactNumber, where: str) -> Iterator[Caution]:
 def _about_period(
     table: Elements, orbit: KeplerOrbit, strength: ExactNumber, where: str, scene: Scene
 ) -> Iterator[Caution]:
-    """A pace that no mass explains: that of the source, and the body's as far as it is known."""
+    """A pace that no mass explains: the source's, and the body's as far as it is known."""
     key = next((key for key in MEAN_MOTION_KEYS if getattr(table, key) is not None), None)
     if key is None or orbit.mean_motion == 0:
         return

@@ -169,7 +169,7 @@ class System:
         return list(zip(self.variables, rates, strict=True))
 
     def _in_internal_time(self, expressions: Sequence[Symbolic]) -> list[Symbolic]:
-        """Expressions of the scene's time as those of internal time."""
+        """Expressions of the scene's time as expressions of internal time."""
         if self.scaling.direction > 0:
             return list(expressions)
         other = {hy.time: -hy.time}

@@ -59,7 +59,7 @@ def _reached(start: set[str], ways: Mapping[str, set[str]]) -> set[str]:
 
 
 def tangent_block(m: Mechanics, before: Sequence[StateBlock]) -> StateBlock:
-    """The tangent vector of a motion whose states are those of the preceding blocks."""
+    """The tangent vector of a motion whose states the preceding blocks have."""
     whole = joined(before)
     variables = whole.variables
     own = own_names(m)

@@ -275,7 +275,7 @@ def register_load(kind: Any = None, **place: str) -> Any:
 
 
 def names_of(fields: Any) -> list[str]:
-    """Names that a load is known by: its own, and that of the body that is its source."""
+    """Names that a load is known by: its own, and its source's."""
     given = (
         fields.name,
         getattr(fields, "source", None),

@@ -159,7 +159,7 @@ def _as_written(scene: Setting) -> InitialRotation:
 
 
 def attitude_from_pole(scene: Setting, node: Any, tilt: Any, turn: Any) -> Vector:
-    """Quaternion of R3(node) R1(tilt) R3(turn) F^T, body axes to those of the plane (radians)."""
+    """Quaternion of R3(node) R1(tilt) R3(turn) F^T, body axes to the plane's axes (radians)."""
     context, figure = scene.context, scene.figure
     turned = attitude.quaternion_from_euler(context, [node, tilt, turn], "zxz")
     columns = transpose([figure.first, figure.second, figure.pole])

@@ -391,7 +391,7 @@ class TracedExact(ExactNumber):
 
     @property
     def rational(self) -> Fraction:
-        """The representative's value, and that of members that share it."""
+        """The representative's value, also for members that share it."""
         self.traced.decided()
         return self.exact.rational
 

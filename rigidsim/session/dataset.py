@@ -135,7 +135,7 @@ def _drift(invariant: Invariant) -> Variable:
 
 
 def _put_back(invariant: Invariant, projected: Sequence[str]) -> Variable:
-    """The corrections put back into an invariant; ``projected``: that of each projected scalar."""
+    """The corrections put back into an invariant; ``projected``: the correction of each projected scalar."""
     what = "norm of the sum of the changes" if projected.count(invariant.name) > 1 else "sum of the changes"
     definition = (
         f"{what} of (value - initial) / scale from one correction to the next, up to the last one before "

@@ -307,7 +307,7 @@ _LONG = 8192
 some 2500 steps in double precision).
 """
 _HELD = 3.0
-"""tolerance sqrt(steps): attitude error with projected invariants, whose growth is that of a random walk.
+"""tolerance sqrt(steps): attitude error with projected invariants, which grows as in a random walk.
 Over free bodies and heavy symmetric tops it was 1 to 2 of that at 1e7 rad (``experiments.long_horizon``).
 """
 _WORTH, _FAR = 30.0, 1000.0

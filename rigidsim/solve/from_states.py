@@ -49,7 +49,7 @@ class AnyStart:
         known = {WORK, PACE, *(name for block in orbits for name in block)}
         taken = {names[place] for place in (*self._places, *self._flight)}
         self.others = [name for name in names if name not in known | taken]
-        """Names of states beside its own and the orbits': of rotors, and those of users."""
+        """Names of further states besides its own and the orbits': of rotors and of users."""
         self.whole = not set(names) - taken
 
     @property

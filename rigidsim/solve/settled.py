@@ -1,4 +1,4 @@
-"""A run's states as those of the same motion in rates and quaternion, whatever they are."""
+"""A run's states, whatever they are, as rates and quaternion of the same motion."""
 
 from __future__ import annotations
 

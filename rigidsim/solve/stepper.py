@@ -224,7 +224,7 @@ class Stepper:
 
 
 _SPARSE = 1.5
-"""Largest ratio of the step suggested by the last two terms to that of the terms before, in proportion to an
+"""Largest ratio of the step by the last two terms to the step by the terms before, in proportion to an
 exponential's terms: 1.5^20 is three digits.
 """
 # A motion whose Taylor series ends (free fall without rotation) would have infinite steps. Natural steps are

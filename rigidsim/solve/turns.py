@@ -85,7 +85,7 @@ def at_poles(sequence: str, middle: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class Continuity:
-    """What joins the angles of a block to those of the block before.
+    """What joins the angles of a block to the angles of the block before.
 
     Attributes:
         turns: full turns of the angles, (angles,).

@@ -68,7 +68,7 @@ def file_sha256(path: Path) -> str:
 
 
 KERNELS = ("ephemeris_sha256", "orientation_sha256")
-"""SHA-256 of the files that place bodies, and of that of a published orientation."""
+"""SHA-256 of the files that place bodies, and of a published orientation's file."""
 SYSTEM = (
     *("formulation", "euler_sequence", "states", "precision_bits", "tolerance", "method", "hold_invariants"),
     *("hold_from_step", "taylor_order", "compact_mode", "unit_exponents", *KERNELS),

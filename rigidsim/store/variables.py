@@ -58,11 +58,11 @@ class Variable:
         return tuple(len(self.labels(dim)) for dim in self.dims)
 
     def part_names(self) -> list[str]:
-        """The value's own name, then those of its residuals."""
+        """The value's own name, then its residuals' names."""
         return [part_name(self.name, part) for part in range(self.parts)]
 
     def part_attributes(self, part: int) -> dict[str, Any]:
-        """Attributes of one part; those of residuals say what they belong to."""
+        """Attributes of one part; a residual's say what it belongs to."""
         if part == 0:
             attributes = dict(self.attributes)
             if self.parts > 1:

@@ -136,7 +136,7 @@ def _bits(dataset: xarray.Dataset) -> int:
 
 
 def _bits_of_members(dataset: xarray.Dataset) -> int:
-    """Bits that distinguish all members' numbers: those of the config's precision, if all share one.
+    """Bits that distinguish all members' numbers: the bits of the config's precision, if all share one.
 
     If precision is swept, or left to ``accuracy``, as many as the dataset's residuals can hold.
     """

@@ -106,7 +106,7 @@ class Tangents:
 
     @property
     def values(self) -> np.ndarray:
-        """Their values in the config, (k,), SI; zero for those of ``initial.attitude``."""
+        """Their values in the config, (k,), SI; zero for ``initial.attitude``."""
         return np.array([float(key.number) for key in self._parametrised.keys])
 
     def at(self, values: Mapping[str, float], times: Sequence[float] | np.ndarray) -> Sensitivities:

@@ -518,7 +518,7 @@ def _held(run: _Run) -> Held | None:
 
 
 _OF_SERIES = 2.0
-"""Rounding of the arguments over that of time, both as errors of the time: the direction of the Moon in
+"""Rounding of the arguments over rounding of time, both as errors of the time: the direction of the Moon in
 single precision is wrong by 1.5e-4 rad (root mean square, 1973 to 1982), where time is by half of that.
 """
 _WITHIN_MONTH = 4.0

@@ -18,7 +18,7 @@ def compare(
     as_json: bool,
     **options: Any,
 ) -> None:
-    """Judge another tool's trajectory; options are those of ``rigidsim.compare``."""
+    """Judge another tool's trajectory; options as in ``rigidsim.compare``."""
     given = load(config, overrides=overrides or [])
     asked = dict(part.strip().partition("=")[::2] for part in (convention or "").split(",") if part.strip())
     found = compared(given, file, convention=asked, kernels=kernels or (), **options)

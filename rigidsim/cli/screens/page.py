@@ -18,7 +18,7 @@ Styled: TypeAlias = str | tuple[str, str]
 _PIPED_WIDTH = 110  # columns, where there is no terminal and COLUMNS says nothing
 _LEAST_WIDTH = 40
 _LABEL = 8
-_BETWEEN = 3  # columns between those of a table
+_BETWEEN = 3  # columns of space between a table's columns
 _NUMBERS = ("largest drift", "final", "bound", "initial", "correction")
 
 

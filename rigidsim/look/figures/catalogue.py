@@ -110,7 +110,7 @@ def compose(
                 panel.draw(axes, shown.rows, found)
         else:
             figure = _two_columns(shown, over_time, beside, table)
-        figure.draw_without_rendering()  # the layout finds its sizes in this round and that of drawing
+        figure.draw_without_rendering()  # the layout finds its sizes in this round and in drawing
     return figure
 
 
@@ -254,7 +254,7 @@ def _is_size(key: str) -> bool:
 
 
 def darkened(figure: Figure) -> None:
-    """Turn a drawn figure to a dark ground: letters and frame bright, hues those of the screen."""
+    """Turn a drawn figure to a dark ground: letters and frame bright, hues as on the screen."""
     figure.set_facecolor(_DARK)
     hues = {paper(name): to_hex(paper(screen(name))) for name in HUES}
     hues |= {PALE: _FADED, INK: _BRIGHT, GREY: _BRIGHT}

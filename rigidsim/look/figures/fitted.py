@@ -205,7 +205,7 @@ def _pole(axes: Axes, dataset: xarray.Dataset, unit: str, length: float) -> None
 
 
 def _tangent(axis: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """Covariance (2, 2), rad^2, of a direction by that of the attitude, east and north about space Z."""
+    """Covariance (2, 2), rad^2, of a direction by the attitude's covariance, east and north about space Z."""
     east = np.cross([0.0, 0.0, 1.0], axis)
     east = np.array([0.0, 1.0, 0.0]) if np.linalg.norm(east) < 1e-9 else east / np.linalg.norm(east)
     north = np.cross(axis, east)

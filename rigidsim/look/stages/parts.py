@@ -186,7 +186,7 @@ class Stage:
     translation: Array | None = None  # (rows, 3), of the reference point; None: it stays at the origin
     arrows: list[Arrow] = field(default_factory=list)
     trails: list[Trail] = field(default_factory=list)
-    origin: bool = False  # that of space is in the picture and marked
+    origin: bool = False  # whether the origin of space is in the picture and marked
     lines: list[Line] = field(default_factory=list)
     spots: list[Spot] = field(default_factory=list)
     vectors: list[Vector] = field(default_factory=list)

@@ -229,7 +229,7 @@ def plane_view(plane: Path) -> rrb.Spatial2DView:
 
 
 def plot_view(plots: Sequence[Plot], clock: Clock, *, named: bool = True) -> rrb.TimeSeriesView:
-    """A view of a plot, or of those of several runs, with the names of its curves or without."""
+    """A view of a plot, or of several runs' plots, with the names of its curves or without."""
     # Independent axes of infinite range: a long run opens whole.
     first, lines = plots[0], sum(len(plot.labels) + len(plot.levels) for plot in plots)
     shown = rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())

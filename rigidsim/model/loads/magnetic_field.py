@@ -365,7 +365,7 @@ class InMagneticField(Placed):
 
     @property
     def wide(self) -> bool:  # type: ignore[override]
-        """Whether its expressions are too long to be unrolled: those of an Earth that turns take seconds."""
+        """Whether its expressions are too long to be unrolled: a turning Earth's take seconds."""
         return isinstance(self.field, EarthField)
 
     @property

@@ -83,7 +83,7 @@ class PlacedByKernel(Placement):
         return SourcePlace([x * inverse for x in vector], inverse, self.distance(m.scene.context))
 
     def motion(self, m: Kinematics) -> SourceMotion:
-        """The derivatives are those of the series; for what is recorded they have to be states."""
+        """The derivatives come from the series; for what is recorded they have to be states."""
         sky = m.carried(m.sky)
         place, velocity, acceleration = (sky.seen(self.sight, order) for order in range(3))
         found = self.seen(m)

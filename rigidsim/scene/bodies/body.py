@@ -153,7 +153,7 @@ def _check_symmetric(tensor: list[list[ExactNumber]]) -> None:
 def _from_pieces(
     table: body_table.Body, source: str, context: Any, sequence: str, preset: Preset | None = None
 ) -> RigidBody:
-    """The body of pieces; those of a preset are scaled to another mass of the same shape."""
+    """The body of pieces; a preset's pieces are scaled to another mass of the same shape."""
     named = "preset" if preset else source
     what = f"it follows from {named}; remove it, and say with reference what the body turns about"
     ensure(table.center_of_mass is None, refusal("center_of_mass", what))

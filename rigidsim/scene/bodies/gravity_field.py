@@ -197,7 +197,7 @@ def _of_file(name: str, body: Any, context: Any, texts: Mapping[str, str], degre
 def refuse_impossible(
     found: Mapping[Harmonic, Any], context: Any, fault: Callable[[str], ConfigError], given: str = ""
 ) -> None:
-    """Refuse coefficients beyond those of any mass within some radii.
+    """Refuse coefficients that no mass within some radii has.
 
     Mass within s R has abs(C_nm) <= 2 s^n max abs(P_nm) (n - m)!/(n + m)!, and P_nm^2 <= (n + m)!/(n - m)!.
     """

@@ -94,7 +94,7 @@ class Preset:
         return [[x * mass / own for x in row] for row in found]
 
     def own_mass(self, context: Any) -> Any | None:
-        """Kg (mpf); None if it isn't published, or is that of the parts."""
+        """Kg (mpf); None if it isn't published, or is the parts' mass."""
         return parse_number(self.mass, "kg").at(context) if self.mass else None
 
 
@@ -139,7 +139,7 @@ FOLDER = files("rigidsim.scene.bodies") / "published"
 PRESETS = Published(FOLDER)
 
 _ALIKE = 0.01
-"""Relative difference up to which a gravitational parameter is that of a known body: for what is written in
+"""Relative difference up to which a gravitational parameter means a known body: for what is written in
 few digits (4e14), and less than what the Moon adds to the Earth (0.0123).
 """
 
@@ -193,6 +193,6 @@ EARTH = next(body for body in KNOWN if body.name == "Earth")
 
 
 def known_body(strength: float) -> KnownBody | None:
-    """The body with a gravitational parameter (m^3/s^2); None if it is that of no known one."""
+    """The body with a gravitational parameter (m^3/s^2); None if no known body has it."""
     near = min(KNOWN, key=lambda one: abs(one.gravitational_parameter - strength))
     return near if near.attracts_by(strength) else None

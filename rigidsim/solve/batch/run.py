@@ -156,7 +156,7 @@ class BatchRun:
 
     @cached_property
     def _plain(self) -> BatchEngine:
-        """The motion; each event has a shift and a factor as parameters after those of the equations."""
+        """The motion; each event has a shift and a factor as parameters after the equations' own."""
         expressions, first = self._traced.as_parameters(self._crossings), len(self._traced.in_equations)
         events = [
             ((expression + hy.par[first + 2 * n]) * hy.par[first + 2 * n + 1], crossing.direction)

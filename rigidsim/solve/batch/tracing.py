@@ -76,7 +76,7 @@ class TracedSystem:
 
     @cached_property
     def moving(self) -> int:
-        """Number of states of the motion; those of a tangent vector follow."""
+        """Number of states of the motion; a tangent vector's states follow."""
         return sum(not name.startswith(TANGENT) for name in self.system.states)
 
     @cached_property

@@ -145,7 +145,7 @@ class ClosedForm:
         return [mpmath.ldexp(w, -self.scaling.time) for w in rates], quaternion
 
     def _context(self, bits: int, late: int) -> mpmath.MPContext:
-        """Context with enough bits, among them those of a phase."""
+        """Context with enough bits, the bits of a phase included."""
         context = mpmath.MPContext()
         context.prec = bits + _GUARD_BITS + late
         return context

@@ -59,7 +59,7 @@ def rms(values: np.ndarray) -> float:
 
 
 def motion_rate(times: np.ndarray, rates: np.ndarray) -> float:
-    """The rate of a motion, rad/s: that of its turning, or of the change of its rates, if that is faster."""
+    """The rate of a motion, rad/s: of its turning, or of the change of its rates, if faster."""
     size = float(np.sqrt(np.mean(np.sum(rates**2, axis=1))))
     steps = np.diff(times)
     change = np.diff(rates, axis=0) / steps[:, None]

@@ -42,7 +42,7 @@ class PhysicalEffect:
 
 
 def load_codes(config: Config) -> list[str]:
-    """A code for each load: its name, or that of its source, or its kind; numbered if others share it."""
+    """A code for each load: its name, or its source's, or its kind; numbered if others share it."""
     plain = [(names_of(x) or [x.kind])[0] for x in config.loads]  # type: ignore[attr-defined]
     shared = Counter(plain)
     return [name if shared[name] == 1 else f"{name}-{n}" for n, name in enumerate(plain, 1)]

@@ -368,7 +368,7 @@ def size_of(prepared: InitialValueProblem) -> int:
 
 
 def _removed(experiment: Experiment, keys: Collection[str]) -> list[str]:
-    """Settings that remove those of the keys that a config gives."""
+    """Settings that remove the keys as far as a config gives them."""
     given = {
         f"{table}.{key}"
         for table in ("output", "integrator")
