@@ -206,7 +206,7 @@ _FEW_TOLERANCES = (1e-6, 1e-10)  # of the other formulations in double precision
 
 _LEAST_BUDGET = 5.0
 _GRACE = 120.0  # extra seconds for what a measurement can't do without, on a busy machine
-_EXPLORING, _SINGLE = 0.65, 0.4  # parts of the budget, for all attitudes and for those of one setting
+_EXPLORING, _SINGLE = 0.65, 0.4  # parts of the budget, for all attitudes and for one setting's
 _PASSES = 0.03  # CPU seconds of passes per setting and process: their median is then known to a few per cent
 _PILOT_STEPS, _WARMING = 4000, 32  # of the default setting; the latter aren't measured
 _ALL, _REFERENCE, _QUADRUPLE, _DIGITS = (0.3, 350.0), (0.3, 1300.0), (0.1, 2600.0), (0.2, 12000.0)

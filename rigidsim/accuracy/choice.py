@@ -4,7 +4,7 @@ of the most averaged model whose measured error is within ``accuracy_axis``.
 Settings are tried over the motion's beginning, which is the whole of a short run, against a better one; what
 wasn't tried follows from what was: errors of rounding are in proportion to the precision's epsilon, those of
 the series to the tolerance. The end follows from the beginning by laws: errors of rounding grow like t^1.5
-(Brouwer 1937), or t with projected invariants; those of the series at most like t^2; both times the motion's
+(Brouwer 1937), or t with projected invariants; errors of the series at most like t^2; both times the motion's
 own growth. A choice is a forecast: the accuracy that the run really kept is certified afterwards
 (``rigidsim.accuracy.certificate``).
 

@@ -368,7 +368,7 @@ def in_model(
 ) -> InitialValueProblem:
     """A scene's motion in a model of some level, in double precision; ``average`` if it is known already."""
     config = scene.config.as_motion(names, precision="double", tolerance="auto", formulation="auto")
-    # geodetic precession adds to either alike, and a window's start is that of the full motion
+    # geodetic precession adds to either alike, and a window starts as the full motion does
     update = {
         "level": level,
         "short_period": short_period,
@@ -414,7 +414,7 @@ _TURN = 2 * math.pi
 @dataclass(frozen=True)
 class Measured:
     """The error of an averaged model, as summaries keep it, and what was seen over the beginning: the CPU
-    time, s, that measuring takes after a run, and the averaged model's steps over those of the full one.
+    time, s, that measuring takes after a run, and the averaged model's steps over the full model's.
     """
 
     modelling: Modelling

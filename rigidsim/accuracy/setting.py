@@ -157,7 +157,7 @@ def asked_of_attitude(experiment: Experiment) -> tuple[str, float] | None:
 def wanted(experiment: Experiment) -> float | None:
     """Accuracy of the attitude for which settings are chosen, rad; None if none is asked for.
 
-    Errors of the path are, relative to its size, about those of the attitude; the certificate says what
+    Errors of the path are, relative to its size, about as large as the attitude's; the certificate says what
     they are, and a more costly setting is chosen if they are larger.
     """
     integrator = experiment.config.integrator

@@ -9,7 +9,7 @@ and Euler's equations L' + w x L = torque become
     I w' = (I w) x w + torque + sum of (h_k x w + g_k),
 
 where g_k = -h_k' is the torque that a carrier exerts on the body, a motor's or friction's (Hughes, Spacecraft
-Attitude Dynamics, 1986, section 3.4). The body's tensor I is then that of what turns with it: of a rotor on a
+Attitude Dynamics, 1986, section 3.4). The body's tensor I then contains what turns with it: of a rotor on a
 bearing it includes the mass, but not the moment about the bearing's axis.
 
 A carrier is a load: it brings its states by ``extra_states``, and is registered, configured and reported in

@@ -1,6 +1,6 @@
 """Frames about the Earth (ITRF, TEME) against GCRF, and SGP4: for starts of flights.
 
-GCRF to ITRF is that of the IERS Conventions 2010 (ch. 5): precession and nutation IAU 2006/2000A with the
+GCRF to ITRF follows the IERS Conventions 2010 (ch. 5): precession and nutation IAU 2006/2000A with the
 measured offsets of the pole, Earth rotation angle, polar motion, by ERFA. UT1, the pole and its offsets are
 the IERS's (finals2000A), as heyoka brings them. TEME is Vallado et al.'s (AIAA 2006-6753): the Earth-fixed
 axes without polar motion, turned back by the sidereal time GMST of 1982; its axes are taken at rest.
@@ -126,7 +126,7 @@ def sgp4(elements: TwoLineElements, epoch: Epoch) -> tuple[list[float], list[flo
     """Position and velocity in TEME (m, m/s) at a date.
 
     Raises:
-        ValueError: the date is far from that of the elements, or SGP4 has no orbit then.
+        ValueError: the date is far from the elements' date, or SGP4 has no orbit then.
     """
     api = package("sgp4.api")
     minutes = float(_terrestrial(epoch) - _terrestrial(elements.epoch)) / 60

@@ -20,8 +20,8 @@ If there are several sources, the first in the config counts. (Hughes, Spacecraf
 ch. 9; Wertz, Spacecraft Attitude Determination and Control, 1978, ch. 2.)
 
 The frame that turns with a circular orbit has Jacobi's constant H = w . I w / 2 - n o . I w + U, with o the
-orbit's normal and n its mean motion. U may be that of any number of sources on circles of one plane and one
-period, plus any potential that the frame's turning doesn't change, such as that of a uniform field along o.
+orbit's normal and n its mean motion. U may come from any number of sources on circles of one plane and one
+period, plus any potential that the frame's turning doesn't change, such as a uniform field's along o.
 """
 
 from __future__ import annotations

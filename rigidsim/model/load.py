@@ -1,7 +1,7 @@
 """Loads: one class each, from the keys of a config to torque, force and potential.
 
 Torques and forces are sums of terms, each a constant vector (mpf, worked out with guard bits) times an
-expression of the state, so that constants are rounded once, with those of the inertia tensor already in them.
+expression of the state, so that constants are rounded once, with the inertia tensor's already in them.
 Loads in a config, rigidsim's own and those you write in Python all derive from ``Load``.
 """
 

@@ -351,7 +351,7 @@ class _Trial:
             times = moments[first : last + 1]
             change, _ = changes(times, now)
             share = np.ones_like(change)
-            # a slope that falls as the state grows ends where the change is that of the slope there
+            # a slope that falls as the state grows ends where the change equals the slope's there
             if np.any((changes(times, now + change)[0] - change) * change < 0):
                 low, high = np.zeros_like(share), share.copy()
                 for _ in range(_HALVINGS):

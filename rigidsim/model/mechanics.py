@@ -202,7 +202,7 @@ class Mechanics(Kinematics):
     def accelerations(self) -> list[Symbolic]:
         """Derivatives of the states of the rates, each in its own unit."""
         torque = [*self.torque, *self.inner_torque]
-        if self.rate_correction is not None:  # M x w is that of the states and this
+        if self.rate_correction is not None:  # M x w is the states' part and this
             turned = cross(self.own_momentum, self.rate_correction)
             torque += zip(unit_vectors(self.scene.context), turned, strict=True)
         return self.inertia.accelerations(self.carried_rates, self.numbers.rate_units, torque)

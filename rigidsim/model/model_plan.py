@@ -52,7 +52,7 @@ def plan_model(
     """Decide on the least system that a scene needs.
 
     Args:
-        extra_loads: loads given from Python, besides those of the config.
+        extra_loads: loads given from Python, besides the config's.
         scaling: if already known from another formulation of the same motion, whose loads were checked.
         like: plan of the same scene in plain numbers, whose estimates and checks hold here too.
         along: the average, already chosen, of a motion that this scene is a part of.

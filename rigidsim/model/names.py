@@ -76,7 +76,7 @@ def to_heyoka(
     Args:
         variables: a heyoka expression for every name used; ``t`` is heyoka's time unless it is given here, as
             an expression or as a ``TwoPartTime``.
-        sides: for the signs of arguments that are switching surfaces; those of others are found wherever the
+        sides: for the signs of arguments that are switching surfaces; signs of others are found wherever the
             expression is evaluated, which is right for values alone: a series would go on past the jump.
 
     Raises:

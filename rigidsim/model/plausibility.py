@@ -30,7 +30,7 @@ _HEIGHT = 1e5  # m: a length from here on may be an altitude
 _DEEP = 0.01  # of the radius: what is nearer to the centre is no altitude, but on a scale of its own
 _SURFACE = 0.99  # of the equatorial radius: orbits may graze flattened bodies
 _ROUGHLY = 0.02  # relative difference of a radius, mean or equatorial, from the published one
-_SIMILAR = 10.0  # ratio of an air density's altitude to that of a flight in it
+_SIMILAR = 10.0  # ratio of an air density's altitude to the altitude of a flight in it
 _PERTURBED = 0.05
 """Relative difference of n^2 a^3 from G M that perturbations explain: the Moon's by the Sun is 0.0075, of
 inner moons of Saturn by its flattening 0.025.

@@ -1,7 +1,7 @@
 """A state that makes step control see pulses and switches in advance.
 
-heyoka chooses a step from the last Taylor coefficients of the states, and those of a pulse that is flat far
-from its middle vanish: the step would pass over it. Beside the motion the system therefore carries
+heyoka chooses a step from the last Taylor coefficients of the states. A pulse that is flat far from its
+middle has vanishing ones: the step would pass over it. Beside the motion the system therefore carries
 
     pace = sum of log(B^2 + u^2) / 64,   pace' = sum of u u' / (B^2 + u^2) / 32
 

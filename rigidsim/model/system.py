@@ -105,7 +105,7 @@ class System:
     def partner(self) -> System | None:
         """The same system in the chart that a run changes to near the singularity; None without a chart.
 
-        Its recorded Euler angles are those of this system's sequence, on the branch given by the parameter
+        Its recorded Euler angles follow this system's sequence, on the branch given by the parameter
         after the invariants' (see ``rigidsim.model.formulations.euler_angles``).
         """
         partner = self.formulation.partner

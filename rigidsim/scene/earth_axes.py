@@ -40,7 +40,7 @@ def earth_axes(epoch: Epoch, axes: str, context: Any) -> Matrix:
 
     Args:
         epoch: the date.
-        axes: name of the space axes that they are in; those of EME2000, ICRF and GCRF are taken as the same
+        axes: name of the space axes that they are in; EME2000, ICRF and GCRF are taken as the same
             (they are 0.02 arcsec apart).
 
     Raises:

@@ -178,7 +178,7 @@ class Range:
     allowed: str
 
     def checked(self, number: ExactNumber, context: Any = None) -> ExactNumber:
-        """The number, which may stand for those of all members in their context; ValueError if it is out."""
+        """The number, which may stand for all members' numbers in their context; ValueError if it is out."""
         if not self.holds(number.at(context or for_doubles())):
             unit = number.assumed or (number.unit and unit_text(powers(number.unit)))
             allowed = self.allowed.format(_KINDS.get(unit, "number"))

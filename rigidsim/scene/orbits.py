@@ -196,7 +196,7 @@ def _rate_meant(pace: tuple[str, ExactNumber], context: Any) -> Any:
 
 
 def _mean_motion(table: Elements, strength: Any | None, around: Setting) -> Any:
-    """Rate of the mean anomaly (mpf, rad/s): that of the pace that was given, or of Kepler's third law if the
+    """Rate of the mean anomaly (mpf, rad/s): from the pace that was given, or Kepler's third law if the
     gravitational parameter ``strength`` is known. Mean longitude is ascending node + periapsis + mean
     anomaly.
     """

@@ -76,7 +76,7 @@ def shepperd(r: Matrix) -> tuple[Vector, dict[tuple[int, int], Scalar]]:
 def quaternion_of(matrices: np.ndarray) -> np.ndarray:
     """Quaternions (rows, 4) w x y z of rotation matrices (rows, 3, 3), continuous in sign (Shepperd 1978)."""
     m, rest = matrices, 1 - np.trace(matrices, axis1=1, axis2=2)
-    products = np.empty((len(m), 4, 4))  # four times those of the quaternion's components
+    products = np.empty((len(m), 4, 4))  # four times the products of the quaternion's components
     products[:, 1:, 1:] = m + m.transpose(0, 2, 1)
     products[:, [1, 2, 3], [1, 2, 3]] += rest[:, None]
     products[:, 0, 0] = 2 - rest

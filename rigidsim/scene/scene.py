@@ -138,7 +138,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
     """Work out the scene of a config: what its loads are worked out against, then these, then its start.
 
     Args:
-        context: arithmetic for its numbers; by default that of the config's precision.
+        context: arithmetic for its numbers; by default the config's precision.
 
     Raises:
         ConfigError: a value contradicts mechanics or another key; names the file.

@@ -161,7 +161,7 @@ def _written_value(text: str) -> Any:
 
 
 def assignments(text: str, keys: Sequence[str]) -> list[str]:
-    """``KEY=VALUE`` in the config's own digits for those of the keys (``table.key``) that it has."""
+    """``KEY=VALUE`` in the config's own digits for the keys (``table.key``) that it has."""
     document = tomlkit.parse(text)
     found = []
     for key in keys:

@@ -35,10 +35,10 @@ WIDE = 4.0
 """Bound within which an argument can't run through a function's whole transition."""
 _FLAT = frozenset({"exp", "sinh", "cosh", "tanh", "erf", "sigmoid", "atan"})
 """Functions that become flat towards an end."""
-_STEEP_POWER = 8  # higher ones vanish to an order near that of the Taylor method
+_STEEP_POWER = 8  # higher ones vanish to an order near the Taylor method's
 _LATE = 64
 """Ratio of a time to the width of what happens then from which a rounded time counts: below it the error, a
-part in 2^46 of the impulse in double precision, is no more than that of some steps.
+part in 2^46 of the impulse in double precision, is no more than the rounding of some steps.
 """
 
 

@@ -1,7 +1,7 @@
 """Sensitivities beside a run's samples: derivatives of attitude, rates and position by keys of its config.
 
 The run's own integrator knows nothing of them. A second one carries the motion with its tangents from sample
-to sample, and is set on the run's own state every few steps, so that the derivatives are those of the motion
+to sample, and is set on the run's own state every few steps, so that the derivatives belong to the motion
 that is recorded however long that is. All depends on the samples' numbers and states alone: a resumed run
 has the same bits.
 """

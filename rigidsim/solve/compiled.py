@@ -1,6 +1,6 @@
 """What heyoka compiles: kept for its next use, made without blocking Ctrl-C, and evaluated row by row.
 
-Code compiled for a trial or an earlier run in this process is reused; that of other processes is found on
+Code compiled for a trial or an earlier run in this process is reused; code of other processes is found on
 disk (``HEYOKA_CACHE_DIR``), in a cache that is kept small here. Even from heyoka's own cache, an engine or a
 function takes some 10 ms to assemble, which is more than many runs take.
 """

@@ -176,7 +176,7 @@ class SteppedCarrier:
     in double precision, which are on the same sides as it is.
 
     The motion itself goes on in the run's arithmetic: in fewer bits it would leave an unstable rest early,
-    and tangents would be those of another motion.
+    and tangents would belong to another motion.
     """
 
     shortest = _PART_OF_STEP

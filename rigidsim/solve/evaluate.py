@@ -23,7 +23,7 @@ RecordedParts = dict[str, list[np.ndarray]]
 
 
 class _PartnerChart:
-    """Recorded variables of samples whose states are those of the partner sequence."""
+    """Recorded variables of samples whose states are in the partner sequence."""
 
     def __init__(
         self,

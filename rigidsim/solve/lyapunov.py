@@ -4,7 +4,7 @@ The tangent vectors of all states are integrated along with the motion and ortho
 the logarithms of their lengths add up to the exponents. In double precision, whatever the run's: exponents
 are known to their statistical error at best.
 
-The spectrum is that of the body's motion. Other states that a scene carries have no tangent vectors:
+The spectrum describes the body's motion. Other states that a scene carries have no tangent vectors:
 neither those that only feed on the motion (the work of the loads, the pace of narrow functions), nor those
 that drive it without feeling it (the position on an orbit), which stand for an explicit dependence on time.
 """

@@ -42,7 +42,7 @@ steps add up like a random walk (Brouwer 1937), with a few roundings per step.
 _SPARE_ORDER = 0.9
 _AUTO_BITS = 3
 """What is cut off from a series always has the same sign for a motion, so that its share in energy grows like
-t, and that of rounding like t^0.5. The order is rounded up from 1 - ln(tolerance) / 2 (Jorba and Zou 2005,
+t, and rounding's like t^0.5. The order is rounded up from 1 - ln(tolerance) / 2 (Jorba and Zou 2005,
 eq. 11): from 19.02 to 20 in double precision, which cuts off a seventh of epsilon and shows no bias to 1e7
 rad; from 8.97 to 9 in single and from 22.83 to 23 in 80 bits, which cut off nearly all of it: mean energy
 errors of 9 standard errors over 1e5 rad, and growth like t^0.6. Where less than this part of an order is

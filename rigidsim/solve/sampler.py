@@ -74,7 +74,7 @@ class Pacing:
     rows_at_once: int = 8192  # samples in a block that is evaluated; more are no faster, and take memory
     rows_waiting: int = 65536  # in memory before they are evaluated: 8 MB in double precision
     skipped_from: int = 12  # steps to a sample from which a call without dense output costs less
-    margin: float = 0.97  # of the steps to a sample, if as long as those of the latest call, that are skipped
+    margin: float = 0.97  # of the steps to a sample, if as long as in the latest call, that are skipped
     spare: float = 4.0  # and fewer by so many, some of which are far from the mean
 
 

@@ -260,7 +260,7 @@ def bound_of_sparse_series(coefficients: np.ndarray) -> float:
     def radius(term: int) -> float:
         return (base / sizes[term]) ** (1 / term) if sizes[term] > 0 else math.inf
 
-    def of_entire(term: int) -> float:  # terms of an exponential, like those of a rotation
+    def of_entire(term: int) -> float:  # terms of an exponential, like a rotation's
         return math.exp(math.lgamma(term + 1) / term)
 
     terms = range(order // 2 + 1, order - 1)

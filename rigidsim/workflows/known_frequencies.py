@@ -30,7 +30,7 @@ _SYMMETRIC = 1e-12  # relative difference of two moments, below which a body is 
 _SMALL = 1e-5  # relative change of the frequencies of modes by their own amplitude
 _TORQUES = 0.02  # the same of modes and of the spin by torques
 _NEAR = 0.3  # of the spin, across it, from which a rotation isn't one about an axis
-_IN_STEP = 0.35  # relative difference of the spin's square from that of a circular orbit at the distance
+_IN_STEP = 0.35  # relative difference of the spin's square from a circular orbit's at the distance
 _FACING = 0.8  # cosine between a principal axis and the source
 OF_ROTATION = ("spin", "wobble", "free_nutation", "free_core_nutation")
 """Frequencies of the rotation, which an averaged motion lacks."""

@@ -24,7 +24,7 @@ from rigidsim.workflows.sweeps.members import single_member
 
 
 def runs_of(paths: Sequence[Path], members: Sequence[int] = ()) -> list[tuple[str, Run]]:
-    """Runs with their names on the screen, each different; with ``members``, those of one sweep."""
+    """Runs with their names on the screen, each different; with ``members``, runs of one sweep."""
     if members:
         return _members(paths, members)
     sweeps = [path for path in paths if is_sweep(path)]

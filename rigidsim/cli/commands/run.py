@@ -18,7 +18,7 @@ def run(
     configs: list[Path] | None, dataset: Path | None, out: Path, overrides: list[str] | None,
     scan: list[str] | None, member: int | None, force: bool, as_json: bool, verbose: bool,
 ) -> int:  # fmt: skip
-    """Read every config before any of them is run; the exit code is that of the first that didn't finish."""
+    """Read every config before any of them is run; the first that didn't finish gives the exit code."""
     experiments = [load(path, overrides=overrides or []) for path in configs or []]
     if dataset is not None:
         experiments.append(embedded(dataset, overrides=overrides or []))

@@ -387,7 +387,7 @@ def save_figure(
     slides: str | None = None,
 ) -> Path:  # fmt: skip
     """Draw a figure of a run to a file (see `figure`), which is whole when this returns its path, in the
-    format given or that of its suffix; with ``slides``, a ground, its leading panel alone (see `for_slides`).
+    format given or its suffix's; with ``slides``, a ground, its leading panel alone (see `for_slides`).
     ``ValueError`` for another suffix, too.
     """
     path = Path(path)

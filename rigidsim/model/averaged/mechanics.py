@@ -9,7 +9,7 @@ w = I^-1 m, s = m / L, and W the rate of these axes, all along themselves,
     q' = q (0, W) / 2,    W = w - p n s + (s x Q - s x (s x dU/ds)) / L + G,
     m' = m x w + N + (Q . s) s,    N = P x dU/dP + T x dU/dT + s x dU/ds.
 
-N is the torque's mean in the body; Q is that of second order, which acts on the momentum in space, and so is
+N is the torque's mean in the body; Q is the second-order mean, which acts on the momentum in space, and so is
 L_0 G x s, the average over rotation and orbits of all other sources.
 """
 

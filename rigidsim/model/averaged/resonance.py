@@ -44,7 +44,7 @@ class SlowStart:
     """Initial state of a resonant average; mpf."""
 
     quaternion: Vector  # attitude of the axes a, b, c, to space axes
-    momentum: Vector  # along them beyond that of exactly p turns to a revolution about c, kg m^2/s
+    momentum: Vector  # along them beyond the momentum at exactly p turns a revolution about c, kg m^2/s
 
 
 @dataclass(frozen=True)

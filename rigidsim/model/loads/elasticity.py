@@ -1,6 +1,6 @@
 """An elastic body: tides and spin distort its tensor of inertia, with a delay.
 
-The states of the rates are those of the undistorted body with the same momentum, w0 = I^-1 M, so that the
+The states of the rates are the rates of the undistorted body with the same momentum, w0 = I^-1 M, so that the
 distorted tensor's rate of change is needed nowhere: M' = M x w + N, w = (I + D)^-1 M; what D is,
 ``Distortion`` works out.
 
@@ -19,7 +19,7 @@ The Rotation of the Earth, ch. 5; Williams et al. 2001, J. Geophys. Res. 106, 27
 
     D = d - tau d' + tau^2/2 d'',
 
-with w' of the undistorted body under its own gyroscopic torque and that of the sources.
+with w' of the undistorted body under its own gyroscopic torque and the sources'.
 
 The momentum M = (I + D) w determines w. In D stands the rate w* of a body without delay, which solves M = (I
 + d(w*)) w*; it is found from w0 = I^-1 M, the rate of the undistorted body, by as many iterations of w = w0 -

@@ -11,7 +11,7 @@ its middle,
 
     <rho x (w x rho)> = (l^2 + a^2/4) (w - n (n . w)) + (a^2/2) n (n . w),    l = |rho|
 
-(Eke and Wang 1995). I' is that of principal_moments, which say how the body's own
+(Eke and Wang 1995). I' is the rate of principal_moments, which say how the body's own
 mass distribution changes: nothing here changes them.
 """
 

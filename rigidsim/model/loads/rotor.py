@@ -76,7 +76,7 @@ class Rotor(Load):
             what = (
                 f"given {context.nstr(moment, 8)} kg m^2, more than the body's own about this axis, "
                 f"{context.nstr(own, 8)} kg m^2, which includes the rotor as if it were locked; make it "
-                "smaller, or add the rotor's tensor to that of [body]"
+                "smaller, or add the rotor's tensor to [body]'s"
             )
             raise around.fault("moment", what)
         motor = None if fields.torque is None else around.expression("torque", fields.torque, "N m")

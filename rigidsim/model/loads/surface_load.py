@@ -6,7 +6,7 @@ shadows, the velocity relative to the air. So their kinks and jumps, at which a 
 or the stream, are surfaces on which steps end, and the states that they take are carried.
 
 **Drag.** A plate of area A with unit normal n moves through the air with velocity v, and is met by it if n .
-v > 0: the force is -rho C A (n . v) v / 2, that of the area seen against the stream; a sphere's is -rho C pi
+v > 0: the force is -rho C A (n . v) v / 2, for the area seen against the stream; a sphere's is -rho C pi
 R^2 |v| v / 2 (Montenbruck & Gill, Satellite Orbits, 2000, section 3.5).
 
 **Radiation pressure.** A plate, met by light from direction u with c = n . u > 0, is pushed by

@@ -39,7 +39,7 @@ class Pieces:
     """Pieces of several series together: one begins wherever one of a series does.
 
     Attributes:
-        knots: as those of ``PieceSeries``.
+        knots: as in ``PieceSeries``.
     """
 
     def __init__(self, parts: Sequence[PieceSeries]) -> None:

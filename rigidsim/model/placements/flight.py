@@ -1,6 +1,6 @@
 """Sources that the body flies by: a point at rest, a body of a kernel, one of the point masses.
 
-Sizes are those of the Kepler orbit through the state at the start.
+Sizes follow from the Kepler orbit through the state at the start.
 """
 
 from __future__ import annotations

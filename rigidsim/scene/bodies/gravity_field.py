@@ -4,7 +4,7 @@ The potential of the body at a distance r, in its body axes, is
 
     (G m / r) sum (R / r)^n P_nm(sin lat) (C_nm cos m lon + S_nm sin m lon)
 
-with unnormalized coefficients (J_n = -C_n0). Those of degree 2 are the inertia tensor's: here, degree 3 is
+with unnormalized coefficients (J_n = -C_n0). Degree 2 follows from the inertia tensor: here, degree 3 is
 the first.
 
 A file of a field is ICGEM (``.gfc``) or SHADR (``.tab`` of the Planetary Data System), recognised by its
@@ -56,7 +56,7 @@ class HarmonicsTable(ConfigTable):
     """Base of tables with unnormalized coefficients ``C`` and ``S`` by "degree,order"."""
 
     least: ClassVar[int]  # degree
-    below: ClassVar[str]  # what gives those of lower degrees
+    below: ClassVar[str]  # what gives lower degrees
 
     @field_validator("C", "S", check_fields=False)
     @classmethod
@@ -68,7 +68,7 @@ class HarmonicsTable(ConfigTable):
                 raise refuse(f"given the key {shown(key)}; {what}")
             n, m = int(match[1]), int(match[2])
             if not cls.least <= n <= MOST:
-                what = f"degrees from {cls.least} to {MOST} are allowed (lower ones are those of {cls.below})"
+                what = f"degrees from {cls.least} to {MOST} are allowed (lower ones follow from {cls.below})"
                 raise refuse(f'given "{key}"; {what}')
             if m > n:
                 raise refuse(f'given "{key}", but the order is at most the degree: "{n},{n}"')

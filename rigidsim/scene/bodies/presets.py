@@ -21,7 +21,7 @@ from rigidsim.scene.exact import parse_number
 class Preset:
     """Moments of inertia, mass and picture of a body, and their source.
 
-    Moments are principal ones along x, y, z (``ratios``), a ``tensor``, or those of ``parts``.
+    Moments are principal ones along x, y, z (``ratios``), a ``tensor``, or follow from ``parts``.
 
     Attributes:
         source: publication of the numbers.
@@ -36,7 +36,7 @@ class Preset:
             A scene itself starts as its ``[initial]`` says.
         tables: what else of ``[body]`` is published with them, as it would be written there: gravity_field,
             elasticity, core.
-        drawn_as: name of the body whose picture is its own; by default that of the preset.
+        drawn_as: name of the body whose picture is its own; by default the preset's.
     """
 
     source: str

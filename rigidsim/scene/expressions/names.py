@@ -1,7 +1,7 @@
 """What an expression may read, besides numbers and ``[parameters]``: names, and who provides them.
 
 A scene has the names that its providers give for its config: time and the body's own always, others with what
-brings them, such as those of a flight with a position in ``[initial]``. Whoever brings something that others
+brings them, such as names of a flight with a position in ``[initial]``. Whoever brings something that others
 may read registers a provider: one class, in a file with what it speaks of. That is all: the parser checks its
 units, an expression that reads it is tried at the start, and its kinks and jumps become surfaces. For the
 distance ``r_NAME`` of a named source, say:
@@ -97,7 +97,7 @@ class NameProvider:
         return {name: x * number(draw(0.5, 2)) + number(draw(-1, 1)) for name, x in start.items()}
 
     def expressions(self, m: Any, names: Collection[str]) -> Mapping[str, Any]:
-        """heyoka expressions of the state, SI, for those of its names that are asked for.
+        """heyoka expressions of the state, SI, for its names that are asked for.
 
         Args:
             m: the ``rigidsim.model.kinematics.Kinematics``, in internal units.

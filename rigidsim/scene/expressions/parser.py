@@ -94,7 +94,7 @@ def parse_expression(
 
     Args:
         text: of at most ``LONGEST_TEXT`` characters (which bounds the tree as well); lines are joined.
-        names: those of time and the state that are allowed here; ``Names`` say what would bring others.
+        names: names of time and the state that are allowed here; ``Names`` say what would bring others.
         parameters: named constants, which enter as exact numbers.
         jumps: whether piecewise constant functions are allowed.
         unit: SI unit of the value; None for any.
@@ -112,7 +112,7 @@ def parse_expression(
             raise ExpressionError(what)
     if len(text) > LONGEST_TEXT:
         raise ExpressionError(f"an expression of {len(text)} characters; at most {LONGEST_TEXT} are allowed")
-    text = " ".join(text.split()) if "\n" in text else text  # columns are those of one line
+    text = " ".join(text.split()) if "\n" in text else text  # columns count within one line
     if not text.strip(" \t"):
         raise ExpressionError("an empty expression; write a number or a formula such as k*sin(t)^2")
     read = _Parser(text, names, parameters, jumps, where).all()
@@ -371,7 +371,7 @@ class Measure:
         return Measure(tuple(sorted((base, n) for base, n in found.items() if n)), written)
 
     def power(self, exponent: ExactNumber | None) -> Measure:
-        """Dimension of a power; for an exponent that isn't rational, only that of a number stays known."""
+        """Dimension of a power; for an exponent that isn't rational, only a number's stays known."""
         if not self.powers:
             return self
         if exponent is None or exponent.pi_power:
@@ -438,7 +438,7 @@ def _check_unit(found: Measure, needed: str, *, read_too: bool = False) -> None:
     """Check that a value can have the required dimension; ``ExpressionError`` otherwise.
 
     Args:
-        read_too: also if its dimension is only that of what it reads.
+        read_too: also if its dimension is only the dimension of what it reads.
     """
     known = found.written or (read_too and bool(found.powers))
     if known and found.powers is not None and found.powers != units.powers(needed):

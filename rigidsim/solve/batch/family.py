@@ -128,7 +128,7 @@ class AxisNumbers:
 
 class Members:
     """Members of a ``[sweep]`` as the batch engine sees them, renumbered from 0 in the order given, all by
-    default. ``keys`` are those of the numbers that become parameters; ``kinds``, (members,), codes of
+    default. ``keys`` belong to the numbers that become parameters; ``kinds``, (members,), codes of
     everything else that differs: members of different kinds belong to different families.
     """
 
@@ -180,7 +180,8 @@ class Numbers:
     """
 
     def __init__(self, traced: TracedSystem, members: np.ndarray, replay: Replay, places: np.ndarray) -> None:
-        self.members, self._replay, self._places = members, replay, places  # places among those of ``replay``
+        # places among the numbers of ``replay``
+        self.members, self._replay, self._places = members, replay, places
         self.initial = np.array([self.doubles(value) for value in traced.system.initial])
         found = [replay.doubles(node)[places] for node in traced.parameters.nodes]
         self.parameters = np.array(found).reshape(len(found), len(members))

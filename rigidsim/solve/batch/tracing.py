@@ -2,7 +2,7 @@
 their numbers, evaluated for many members at once, in the scene's own arithmetic.
 
 heyoka's arrays of multiprecision numbers (MPFR) round sums, products, quotients and roots as mpmath does, so
-that each member's numbers are those of its own build in every bit. Other functions are mpmath's own, once for
+that each member's numbers equal its own build's in every bit. Other functions are mpmath's own, once for
 each of the values that they are taken of.
 """
 

@@ -87,7 +87,7 @@ def heavy_motion(
         axes: right-handed, body axes; the third from the fixed point to the centre of mass.
         moments: across and along the axis, about the fixed point; the second may be zero (see
             ``free_motion``).
-        pull: M g l > 0, in units that agree with those of moments and rates.
+        pull: M g l > 0, in units that agree with the units of moments and rates.
         vertical: unit vector against gravity at the start, body axes.
     """
     a, c = moments
@@ -116,7 +116,7 @@ def heavy_motion(
     if g1 * w2 - g2 * w1 < 0:
         start = -start
     cubic = _Cubic(Argument(grid, speed, start), a, u1, u2, u3)
-    excess = (w3 - axial / a) / 2  # excess of the spin over that of a sphere
+    excess = (w3 - axial / a) / 2  # excess of the spin over a sphere's
     alpha = _rising(cubic, excess, upright + axial)
     beta = _falling(cubic, one, one / 2, -excess, upright - axial)
     turning = -2 * excess - axial / (2 * a)

@@ -2,7 +2,7 @@
 Newton's method with central differences, for few unknowns that may be degenerate, and exponents by which
 motions near a zero go on.
 
-The equations are those of a run, with the attitude in space axes. They are compiled once for each width and
+The equations are a run's, with the attitude in space axes. They are compiled once for each width and
 evaluated or integrated from where the caller says; what surrounds the rotation (orbits) begins where the
 scene has it. Numbers go in and out as mpf.
 """

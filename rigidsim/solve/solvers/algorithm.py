@@ -29,7 +29,7 @@ class Algorithm:
     Attributes:
         method: what can be said of it for any scene.
         finds_events: whether its stepper looks for ``[[events]]``, which needs steps.
-        sets_parameters: whether its stepper sets those of equations that change at surfaces or given times.
+        sets_parameters: whether its stepper sets parameters of equations that change at surfaces or times.
         takes_series: whether its steps are Taylor series, which a root of zero at the start has none of.
         own_errors: whether it reports its errors itself (``Stepper.errors``), or has none; if not, they
             are estimated from motions that begin beside its own, in heyoka's rounding.

@@ -49,7 +49,7 @@ class FitKeys:
     """All numbers of a fit, estimated ones first, each in the order of the config.
 
     Attributes:
-        estimated: those of ``[fit] parameters``. considered: those of ``[fit] consider``.
+        estimated: keys in ``[fit] parameters``. considered: keys in ``[fit] consider``.
         scene: of the config's values.
     """
 

@@ -177,7 +177,7 @@ class FitResult(SummaryPart):
         part: str = "page",
     ) -> int:  # fmt: skip
         """The fitted motion in the viewer, with a cone of one standard deviation about the figure axis, or a
-        picture of it; arguments, value and errors are those of ``Run.view``.
+        picture of it; arguments, value and errors as in ``Run.view``.
         """
         shown = fitted_run(self.experiment, self.dataset, self.folder or "memory")
         return shown.view(web=web, png=png, at=at, part=part)
@@ -476,7 +476,7 @@ def fitted_run(experiment: Experiment, fit: xarray.Dataset, source: str = "memor
         experiment: with the estimated values. fit: the fit's dataset.
 
     Raises:
-        RunFolderError: the experiment's motion isn't that of the dataset.
+        RunFolderError: the experiment's motion isn't the dataset's.
     """
     asked = experiment.config.output.record
     more = asked is not None and QUATERNION not in asked and _COVARIANCE in fit

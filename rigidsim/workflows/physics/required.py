@@ -184,7 +184,7 @@ def required_physics(
         try:
             alone[code] = models.run([code])
         except ConfigError as problem:
-            # without the names that are allowed: numbers of tables are those of the smaller config
+            # without the names that are allowed: tables are numbered as in the smaller config
             reasons = "; ".join(one.what.partition("; allowed: ")[0] for one in problem.problems)
             absent.append((f"{effect.words} ({code})", f"can't be left out by itself: {reasons}"))
     if not alone:

@@ -92,7 +92,7 @@ def _saved(variable: xarray.DataArray, sweep: Sweep, members: Sequence[int]) -> 
 
 
 def _environment(then: dict[str, Any]) -> list[str]:
-    """Versions and processor features that differ from those of the sweep."""
+    """Versions and processor features that differ from the sweep's."""
     now = {f"version_{name}": version for name, version in provenance.versions().items()}
     now["cpu_model"] = provenance.cpu_model()
     changed = {name: value for name, value in now.items() if then.get(name) not in (None, value)}
