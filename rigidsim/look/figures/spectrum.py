@@ -88,8 +88,8 @@ def _draw(axes: Any, signal: xarray.Dataset, nyquist: float) -> None:
     title, slope = str(signal["signal"].item()), float(signal["secular_rate"].item())
     if math.isfinite(slope) and units == "rad":
         rate = slope / _ARCSEC * YEAR
-        shown = f"{rate:.6g} arcsec/yr" if abs(rate) < 1e7 else f"{slope:.6g} rad/s"
-        title += f", without its secular rate of {shown}"
+        rate_text = f"{rate:.6g} arcsec/yr" if abs(rate) < 1e7 else f"{slope:.6g} rad/s"
+        title += f", without its secular rate of {rate_text}"
     axes.set_title(title)
 
 
