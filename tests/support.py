@@ -40,7 +40,7 @@ import functools, rigidsim.workflows.run as workflow
 from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing
 from rigidsim.store.segments import SegmentLimits
-tuning = Tuning(Pacing(patience=0.05), SegmentLimits(seconds=0.05))
+tuning = Tuning(Pacing(chunk_seconds=0.005, patience=0.0), SegmentLimits(seconds=0.0))
 workflow.run = functools.partial(workflow.run, tuning=tuning)
 """
 EPSILON = {"single": 2.0**-23, "double": 2.0**-52, "extended": 2.0**-63, "quadruple": 2.0**-112}

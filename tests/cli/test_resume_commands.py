@@ -42,7 +42,7 @@ def test_resume_goes_on_and_verify_agrees(config: Config, rigidsim_command: Comm
 @pytest.mark.parametrize("number", cases([signal.SIGTERM, signal.SIGKILL], [signal.SIGKILL]))
 def test_a_process_that_was_ended_is_resumed(number: int, config: Config, start: Start) -> None:
     """With the bits of a run in one go."""
-    time_table = "end = 4000\nsamples = 401"
+    time_table = "end = 6000\nsamples = 601"
     process = start("run", config(time=time_table, integrator='precision = "extended"'), prelude=OFTEN)
     deadline = time.monotonic() + 60
     while len(list(Path("runs/free/segments").glob("[0-9]*.h5"))) < 2:
@@ -53,7 +53,7 @@ def test_a_process_that_was_ended_is_resumed(number: int, config: Config, start:
     assert process.returncode == (-9 if number == signal.SIGKILL else 130)
     assert "Traceback" not in err
     with rigidsim.open_run("runs/free").dataset as partial:
-        assert 0 < partial.sizes["time"] < 401
+        assert 0 < partial.sizes["time"] < 601
     resumed = rigidsim.resume("runs/free")
     whole = rigidsim.run("free.toml", out="whole")
     same_bits(resumed, whole)
