@@ -312,7 +312,7 @@ class _Pair:
         return {part: f"{start} {part}" for part in _PARTS[self.source.extended]}
 
     def formula(self) -> tuple[str, dict[str, Readable]]:
-        """The share in terms of names of its own."""
+        """The share in terms of the source's names."""
         text, found = _PAST[self.source.extended], {}
         states = self.source.states | self.other.states
         for part, name in self.parts.items():
@@ -400,7 +400,7 @@ def _shares(view: View, units: list[Any], first: Any, second: Any, before: Any) 
     Args:
         units: unit vectors to the source and to the other one.
         first: sine of the source's angular radius; None of a point.
-        second: that of the other one's.
+        second: the same of the other one.
         before: whether the other one is nearer.
     """
     functions, context, choose = view.functions, view.scene.context, view.choose

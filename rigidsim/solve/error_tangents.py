@@ -335,7 +335,7 @@ class ErrorTangents:
 
     def _stretch(self, going: np.ndarray, until: np.ndarray) -> None:
         """Follow some motions through one stretch, with the errors of half of its steps added before it, and
-        those of the others after it. Where tangents grow too much it is repeated, shorter.
+        the errors of the others after it. Where tangents grow too much it is repeated, shorter.
         """
         # the same number of draws in each round, for whichever motions
         clock, *normal = self._random.standard_normal((1 + 2 * len(self._states), TANGENTS))

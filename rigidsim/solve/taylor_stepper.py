@@ -100,7 +100,7 @@ class TaylorStepper(Stepper):
 
     @property
     def _along(self) -> tuple[int, ...]:
-        """Surfaces along which the motion slides, with equations of its own."""
+        """Surfaces along which the motion slides, with separate equations."""
         return ()
 
     def use(self, chart: int) -> None:

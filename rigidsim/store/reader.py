@@ -194,7 +194,7 @@ class _Files(AbstractDataStore):
 def _read_attributes(stored: Mapping[str, Any]) -> dict[str, Any]:
     """Attributes of an HDF5 object, without the ones by which netCDF-4 holds dimensions."""
     return {
-        name: value if isinstance(value, str) or len(value) != 1 else value[0]
+        name: value[0] if np.shape(value) == (1,) else value
         for name, value in stored.items()
         if name not in _OF_NETCDF
     }

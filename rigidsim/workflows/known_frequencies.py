@@ -183,7 +183,7 @@ def _turning(scene: Scene, axis: Vector) -> _Turning | None:
 def _spin_change(scene: Scene, turning: _Turning, *, cored: bool) -> tuple[float, float] | None:
     """Relative errors of the spin about a principal axis as at the start, and of the torque-free wobble.
 
-    None where other torques than gravity gradients act (and those of a core), or where the amplitude of a
+    None where other torques than gravity gradients act (and torques of a core), or where the amplitude of a
     body without symmetry counts.
     """
     low, high, polar = turning.moments

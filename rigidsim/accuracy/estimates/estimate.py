@@ -484,7 +484,7 @@ def _tangents_of(run: _Run, start: float, end: float) -> ErrorTangents:
 
 
 def _stepped(run: _Run, start: float, end: float) -> Carrier | None:
-    """What follows the motion by steps of its own; None where that costs more than code for all motions."""
+    """What follows the motion by separate steps; None where that costs more than code for all motions."""
     prepared, system = run.prepared, run.system
     if not (system.switches or run.steps < _BY_ITSELF):
         return None

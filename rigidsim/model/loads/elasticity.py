@@ -66,7 +66,7 @@ Linear = Callable[[list[Any]], list[Any]]
 
 @dataclass(frozen=True)
 class SeenTide:
-    """A source that raises tides, in a unit of length of its own and internal units of time.
+    """A source that raises tides, in a separate unit of length and internal units of time.
 
     Attributes:
         place, velocity, acceleration: of the source in space, as components along the body axes.
@@ -264,7 +264,7 @@ def _outer(vector: list[Any], factor: Any, scale: Any) -> Matrix:
 
 
 def _expanded(series: Sequence[list[Any]], scale: Sequence[Any], least: Any) -> Matrix:
-    """f x x^T to second order, from the terms of x and sums of those of f: with x = a + b + c it is the
+    """f x x^T to second order, from the terms of x and sums of the terms of f: with x = a + b + c it is the
     symmetric part of a (s0 a + s1 b + s2 c)^T, plus f b b^T.
     """
     a, b, _ = series

@@ -38,7 +38,7 @@ _FORMS = {"plate": ("normal", "area", "both_sides"), "box": ("size",), "sphere":
 
 
 def _one_form(table: Any) -> str:
-    """A rule: the keys belong to one form, and a plate has both of its own."""
+    """A rule: the keys belong to one form, and a plate needs ``normal`` and ``area``."""
     given = [form for form, keys in _FORMS.items() if table.model_fields_set & set(keys)]
     if len(given) != 1:
         what = f"given the keys of a {' and a '.join(given)}" if given else "given none of its forms"

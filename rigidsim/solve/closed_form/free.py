@@ -69,7 +69,7 @@ class AsymmetricFree(Motion):
     amplitudes: tuple[Any, Any, Any]  # W1, W2, W3
     leans: tuple[Any, Any, Any]  # amplitudes of L1 / 2L, L2 / 2L and L3 / L
     functions: Jacobi
-    phase: Theta  # theta function with the phase of alpha; it has a variable of its own
+    phase: Theta  # theta function with the phase of alpha, of another variable
     rate: Any  # mean rate of s/2 and its change per half period, as in ``Strand``
     step: Any
     momentum: Any

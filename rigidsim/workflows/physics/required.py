@@ -257,7 +257,7 @@ class _ModelRun:
 
     Attributes:
         rotations: rotation vectors (n, 3), arcsec, from the full model's attitudes to its own.
-        uncertainty: of its own attitude at the end by rounding, rad; None if not estimated.
+        uncertainty: of the model's attitude at the end by rounding, rad; None if not estimated.
         measured: the fields of a ``MeasuredModel``.
     """
 
