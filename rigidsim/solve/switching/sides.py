@@ -88,7 +88,7 @@ class SurfaceFunctions:
         sizes = [[g * g for g in slopes(expression)[1].values()] for expression in found]
         lengths = [hy.sqrt(hy.sum(squares)) if squares else hy.expression(0.0) for squares in sizes]
         often = [*system.turning, *system.signed, *spin], [*found, *lengths], [*system.surfaces, *changes]
-        self._ends = np.cumsum([len(part) for part in often])
+        self._ends = np.cumsum([len(part) for part in often]).tolist()
         outputs = [*system.surfaces, *by_time, *rates, *gradients, *fields, *named]
         self._often, self._everything = (
             compiled_function(given, variables, compact_mode=True, **precision.options)
@@ -118,9 +118,9 @@ class SurfaceFunctions:
 
     def beside(self, state: np.ndarray, time: Scalar, pars: np.ndarray, j: int) -> float:
         """A size well above an argument's rounding, which is added to its event beside its zero."""
-        found = self._often(state, pars=pars, time=time)[self._ends[1] :]
-        noise = max(_ROUNDINGS * float(found[self._surfaces + j]), _LEAST)
-        return 2 * abs(float(found[j])) + self._epsilon * noise
+        found, place = self._often(state, pars=pars, time=time), self._ends[1] + j
+        noise = max(_ROUNDINGS * float(found[place + self._surfaces]), _LEAST)
+        return 2 * abs(float(found[place])) + self._epsilon * noise
 
     def looks(self, states: np.ndarray, times: np.ndarray, pars: np.ndarray) -> SurfaceValues:
         """Surfaces and fields at many states (n, states), times (n,) and parameters (n, parameters)."""

@@ -69,14 +69,19 @@ class _Passed(NamedTuple):
     """A boundary that was passed among many, with what its step may have to be taken back for.
 
     Attributes:
+        pars: parameters beyond it, of which the first are the sides.
         crossed: the surface on which the step ended; -1 for none.
+        switches: number and begin of the switches that may accumulate.
         samples: number of samples taken up to here.
         series: Taylor coefficients of the step if it began on a surface, (states, order + 1).
     """
 
-    mark: Mark
+    time: tuple[Scalar, Scalar]
+    state: np.ndarray
+    events: int
     pars: np.ndarray
     crossed: int
+    switches: tuple[int, float]
     samples: int
     size: float
     series: np.ndarray | None
@@ -109,6 +114,8 @@ class SwitchingStepper(TaylorStepper):
         self._modes = [1] * len(system.surfaces)
         self._free = np.array([j not in self._moments.timed for j in range(len(self._modes))], dtype=bool)
         self._crossed, self._count, self._since = 0, 0, 0.0
+        shortest = min(_SHORTEST, (_ROUNDINGS * float(precision.epsilon)) ** 0.5)
+        self._window = _MOST_SWITCHES * shortest  # within which so many switches are an accumulation
         self._count_of_pars = system.parameters  # without what is added to events
         self._piece: np.ndarray | None = None  # parameters of the piece in which the latest step was
         self._now = np.zeros(0)  # parameters that sides and equations read, all of them
@@ -141,6 +148,15 @@ class SwitchingStepper(TaylorStepper):
         sides = *self._modes, *turned.angles, *turned.quaternion, self._crossed, self._count, self._since
         memory = self._tiny, sides
         return Mark(engine.dtime, np.array(engine.state), len(self.log.found), self.steps, memory)
+
+    def _back_among(self, begun: Mark, passed: list[_Passed]) -> None:
+        """Return to the last of some boundaries that were passed among many, or to where they begin."""
+        if not passed:
+            return self.back_to(begun)
+        last, (tiny, sides) = passed[-1], begun.memory
+        modes = [1 if side > 0 else -1 for side in last.pars[: len(self._modes)]]
+        memory = tiny, (*modes, *sides[len(modes) : -3], last.crossed + 1, *last.switches)
+        return self.back_to(Mark(last.time, last.state, last.events, begun.steps + len(passed), memory))
 
     def back_to(self, mark: Mark) -> None:
         tiny, sides = mark.memory
@@ -342,7 +358,7 @@ class SwitchingStepper(TaylorStepper):
         """Take several plain steps; returns whether the one that follows has to be taken by itself."""
         until = self._meet()
         self._set()
-        self._quieten()
+        self._quieten(self.time if self._crossed else None)
         engine, begun, known = self._integrator, self.mark(), 0 if samples is None else len(samples.states)
         self._passed, self._samples, self._cut, self._halted = [], samples, None, False
         self._fresh = bool(self._crossed) or not self.steps
@@ -358,11 +374,13 @@ class SwitchingStepper(TaylorStepper):
             )
         finally:
             passed, self._passed, self._samples = self._passed, None, None
+        if passed:
+            self.steps, self._crossed = self.steps + len(passed), passed[-1].crossed + 1
         kept, alone = self._holding(begun, passed)
         alone = alone or (kept == len(passed) and (self._halted or outcome == hy.taylor_outcome.err_nf_state))
         self._ahead = min(2 * self._ahead, _MOST_AHEAD) if kept == len(passed) else max(kept, 1)
         if alone or kept < len(passed):
-            self.back_to(passed[kept - 1].mark if kept else begun)
+            self._back_among(begun, passed[:kept])
             if samples is not None:
                 samples.back_to(passed[kept - 1].samples if kept else known)
         if kept:
@@ -375,39 +393,37 @@ class SwitchingStepper(TaylorStepper):
         """Go on beyond a surface on which a step ended among many; False if that has to be looked into."""
         if side != -self._modes[j] or not self._counts(float(engine.time)):
             return False
-        self._modes[j], first = side, self._count_of_pars
+        self._modes[j], first, self._now = side, self._count_of_pars, self._now.copy()
         engine.pars[j] = self._now[j] = self._plus if side > 0 else self._minus
         beside = self._functions.beside(engine.state, engine.time, self._now, j)
         engine.pars[first + j] = self.precision.of_double(side * beside)
-        self.log.quiet_until = engine.time + self._width(engine.time)
+        self._quieten(engine.time)
         return True
 
     def _pass(self, engine: TaylorEngine) -> bool:
         """Note a boundary among many."""
-        knot = self._knot
-        self._halted = self._halted or (knot is not None and (engine.dtime >= knot or engine.time >= knot[0]))
+        time, knot, samples, passed = engine.dtime, self._knot, self._samples, self._passed
+        self._halted = self._halted or (knot is not None and (time >= knot or time[0] >= knot[0]))
         if self._halted:
             return False
-        first, crossed = self._count_of_pars, 0 if self._cut is None else self._cut[0] + 1
-        offset = [first + crossed - 1] if crossed else []
+        assert passed is not None
+        first, crossed = self._count_of_pars, -1 if self._cut is None else self._cut[0]
+        offset = [] if crossed < 0 else [first + crossed]
         for place in self._offset:
             if place not in offset:
                 engine.pars[place] = self._off
-        time = engine.dtime
         if self._functions.clocked and self.system.pieces is None:
-            self._now[-1] = time[1]
+            self._now = np.append(self._now[:-1], time[1])
             if len(engine.pars) >= first:
                 engine.pars[first - 1] = time[1]
-        samples = self._samples
         going = samples is None or samples(engine)
-        assert self._passed is not None
-        self.steps, self._crossed = self.steps + 1, crossed
         taken = 0 if samples is None else len(samples.states)
         series, size = np.array(engine.tc) if self._fresh else None, abs(float(engine.last_h))
-        self._passed.append(_Passed(self.mark(), np.array(self._now), crossed - 1, taken, size, series))
-        if not crossed:
-            self.log.quiet_until = None
-        self._offset, self._cut, self._fresh = offset, None, bool(crossed)
+        state, events, switches = np.array(engine.state), len(self.log.found), (self._count, self._since)
+        passed.append(_Passed(time, state, events, self._now, crossed, switches, taken, size, series))
+        if crossed < 0:
+            self._quieten(None)
+        self._offset, self._cut, self._fresh = offset, None, crossed >= 0
         return going
 
     def _holding(self, begun: Mark, passed: list[_Passed]) -> tuple[int, bool]:
@@ -418,15 +434,15 @@ class SwitchingStepper(TaylorStepper):
         """
         if not passed:
             return 0, False
-        states = np.array([begun.state, *(one.mark.state for one in passed)])
-        before, here, times = states[:-1], states[1:], np.array([one.mark.time[0] for one in passed])
+        states = np.array([begun.state, *(one.state for one in passed)])
+        before, here, times = states[:-1], states[1:], np.array([one.time[0] for one in passed])
         pars, crossed = np.array([one.pars for one in passed]), np.array([one.crossed for one in passed])
         sides = np.where(pars[:, : len(self._modes)] > 0, 1.0, -1.0)
         look = self._functions.looks(here, times, pars)
         size, widths = np.abs(look.u), look.noises(before, here, look.field.T)
         others = self._free[:, None] & (np.arange(sides.shape[1])[:, None] != crossed)
-        bad = (others & (sides.T * look.u < -look.noises(here))).any(axis=0)
-        near = (others & (size <= widths)).any(axis=0)
+        near, wrong = (others & (size <= widths)).any(axis=0), others & (sides.T * look.u < 0)
+        bad = (wrong & (size > look.noises(here))).any(axis=0) if wrong.any() else np.zeros_like(near)
         rows = np.flatnonzero(crossed >= 0)
         if len(rows):
             j, each, flipped = crossed[rows], np.arange(len(rows)), pars[rows]
@@ -463,7 +479,7 @@ class SwitchingStepper(TaylorStepper):
             return False
         until = self._meet()
         self._watched()
-        self._quieten()
+        self._quieten(self.time if self._crossed else None)
         events, longest, muted = len(self.log.found), self._longest, set[int]()
         for attempt in range(self.precision.bits + _ATTEMPTS):
             engine = self._integrator
@@ -553,10 +569,10 @@ class SwitchingStepper(TaylorStepper):
         size = _WIDTH * self._epsilon * max(abs(float(time)), 1.0)
         return self.precision.of_double(size)
 
-    def _quieten(self) -> None:
-        """Suppress events at the surface where the latest step ended, which found them."""
-        time = self.time
-        self.log.quiet_until = time + self._width(time) if self._crossed else None
+    def _quieten(self, crossed: Scalar | None) -> None:
+        """Suppress events at the surface where the latest step ended, at this time, which found them."""
+        if self.has_events:
+            self.log.quiet_until = None if crossed is None else crossed + self._width(crossed)
 
     def _wrong(self, before: np.ndarray) -> tuple[int | None, int | None]:
         """A surface on whose wrong side the step just taken ended, although the engine found no zero; and one
@@ -596,11 +612,6 @@ class SwitchingStepper(TaylorStepper):
         """Surfaces whose arguments are zero but for rounding of these states."""
         near = np.abs(look.u) <= look.noises(*states)
         return [int(j) for j in np.flatnonzero(near[:, 0] & self._free)]
-
-    @property
-    def _window(self) -> float:
-        """Time (internal units) within which ``_MOST_SWITCHES`` count as an accumulation."""
-        return _MOST_SWITCHES * min(_SHORTEST, (_ROUNDINGS * self._epsilon) ** 0.5)
 
     def _counts(self, now: float) -> bool:
         """Count a switch; False if they accumulate."""
