@@ -1,7 +1,7 @@
 """Pictures of a recorded run, from its dataset alone: rerun timeline, figures, viewer.
 
-Two folders load what draws, and are imported only where a picture is drawn: `timeline` loads rerun,
-`figures` matplotlib. All else is numbers and texts, for both.
+Three folders load what draws, and are imported only where a picture is drawn: `timeline` and `stages` load
+rerun, `figures` matplotlib. All else is numbers and texts, for both.
 
 | module | holds |
 | --- | --- |
@@ -12,7 +12,7 @@ Two folders load what draws, and are imported only where a picture is drawn: `ti
 | `curves`, `paths`, `plots` | what is drawn over time, and in planes, in one form for both |
 | `pages` | what a scene shows first, its numbers in words, pages of text |
 | `units` | units for readers |
-| `stages` | stages by kind of scene, as numbers; a package of its own |
+| `stages` | stages by kind of scene, as entities of rerun; a package of its own |
 | `sources`, `gyrostats` | what pulls at a body, and librations; bodies with rotors |
 | `fits` | secular parts, periods and ellipses, by ``analysis`` |
 | `thinning`, `states` | a bounded number of a dataset's rows; lanes of events |

@@ -67,13 +67,14 @@ def test_the_view_turns_with_the_direction_of_the_earth_and_has_north_upwards(se
     face = picture.stages[0]
     assert (face.title, face.looked_from) == ("Seen from the Earth", "eye")
     assert subject.reach == pytest.approx(1737400.0)
-    frame = Rotation.from_quat(face.frames["eye"])
+    drawn = {part.path: part.values for part in face.parts}
+    frame = Rotation.from_quat(drawn["eye"])
     np.testing.assert_allclose(frame.inv().apply(earth) - [1, 0, 0], 0, atol=1e-6)
     # the mean pole is the ecliptic's, to what the last cycle of the node leaves
     upwards = frame.inv().apply(np.tile([0, -np.sin(OBLIQUITY), np.cos(OBLIQUITY)], (len(earth), 1)))
     assert np.abs(upwards - [0, 0, 1]).max() < 5e-3
     # the track is where the Earth stands over the body: in its axes
-    track = face.trails[0].points
+    track = drawn["body/sub_source/recent"]
     np.testing.assert_allclose(
         track / np.linalg.norm(track, axis=1)[:, None], attitude.inv().apply(earth), atol=1e-12
     )

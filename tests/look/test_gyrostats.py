@@ -100,7 +100,7 @@ def test_rotors_are_in_the_recording_and_turn_by_their_rates(
     turned = read_back(tmp_path / "driven.rrd", "/scene/body/rotor_wheel")["Transform3D:quaternion"]
     # spun up by 0.5 N m for a minute, to some 300 rad/s: 12 turns a sample, drawn 200 times slower
     picture = build_picture(driven)[0]
-    (axle,) = [line for line in picture.stages[0].lines if line.words]
+    (axle,) = [part for part in picture.stages[0].parts if part.path.endswith("axle")]
     assert axle.words == "rotor wheel, drawn turning 200 times slower"
     assert "rotor_rates" in leading(driven)[0]
     time = driven["time"].values

@@ -95,12 +95,11 @@ def _write_empty(dataset: rigidsim.Run, path: Path) -> None:
     drawn = DrawnRun.of(dataset, ROWS)
     with recording_to(path, "empty", len(drawn.seconds), build_blueprint(drawn)) as recording:
         stages = [
-            replace(stage, meshes=[], points=np.zeros((0, 3)), arrows=[], trails=[], axis_length=0.0)
+            replace(stage, parts=[part for part in stage.parts if "around/" in part.path])
             for stage in drawn.picture.stages
         ]
         bare = replace(drawn, picture=replace(drawn.picture, stages=stages))
-        bare.draw_static(recording)
-        bare.draw_rows(recording, slice(0, len(drawn.seconds)))
+        bare.draw(recording)
 
 
 @pytest.mark.slow

@@ -48,7 +48,7 @@ def test_precession_and_nutation(ready: Ready) -> None:
     ellipse = re.search(r"([\d.]+ \w+): semi-axes", texts(dataset, "nutation"))
     assert ellipse is not None
     assert period(ellipse[1]) == pytest.approx(leading.period, rel=5e-3)
-    words = " ".join(line.words or "" for stage in build_picture(dataset)[0].stages for line in stage.lines)
+    words = " ".join(part.words for stage in build_picture(dataset)[0].stages for part in stage.parts)
     once = re.search(r"once in ([\d.]+ \w+)", words)
     assert once is not None, words
     assert period(once[1]) == pytest.approx(2 * np.pi / abs(rate), rel=5e-3)

@@ -82,11 +82,10 @@ def test_the_stage_is_that_of_the_scene(symmetric_top: Build, kind: str) -> None
 def test_the_ellipsoid_of_energy_touches_the_invariable_plane_at_the_tip(symmetric_top: Build) -> None:
     dataset = symmetric_top(count=101)
     rolling = picture(dataset).stages[1]
-    (shell,) = rolling.solids
-    polhode, herpolhode = (t.points for t in rolling.trails)
-    half_sizes = shell.mesh.vertices.max(axis=0)
+    drawn = {part.path: part.values for part in rolling.parts}
+    polhode, herpolhode = drawn["body/polhode/recent"], drawn["herpolhode/recent"]
+    half_sizes = drawn["body/around/energy_ellipsoid"].max(axis=0)
     np.testing.assert_allclose(((polhode / half_sizes) ** 2).sum(axis=1), 1, rtol=1e-9)
     heights = herpolhode[:, 2]  # L is along Z
     np.testing.assert_allclose(heights, heights[0], rtol=1e-9)
-    rim = next(line for line in rolling.lines if line.name == "plane/rim")
-    np.testing.assert_allclose(rim.points[:, 2], heights[0], rtol=1e-9)
+    np.testing.assert_allclose(drawn["around/plane/rim"][:, 2], heights[0], rtol=1e-9)

@@ -38,6 +38,6 @@ def test_the_angle_to_the_wind_is_that_of_the_velocity_in_turning_air(shuttlecoc
     assert axes.lines[0].get_ydata() == pytest.approx(expected, abs=1e-5)  # arccos near zero
     assert expected[0] > 45
     picture, _ = build_picture(shuttlecock)
-    air = next(arrow for arrow in picture.stages[0].arrows if arrow.name == "air")
-    in_space = attitude.apply(air.vectors)
+    air = next(part for part in picture.stages[0].parts if part.path == "body/air")
+    in_space = attitude.apply(air.values)
     assert np.einsum("ti,ti->t", in_space, relative) == pytest.approx(1.6 * np.linalg.norm(relative, axis=1))

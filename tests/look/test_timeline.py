@@ -10,7 +10,7 @@ import xarray
 pytest.importorskip("rerun")
 
 from rigidsim.look.timeline import write_timeline
-from rigidsim.look.timeline.writing import CHUNK
+from rigidsim.look.timeline.drawn import CHUNK
 
 Build = Callable[..., xarray.Dataset]
 Read = Callable[[Path, str], dict[str, np.ndarray]]

@@ -10,7 +10,7 @@ pytest.importorskip("rerun")
 
 from rigidsim.look.solids import rotation_matrix
 from rigidsim.look.stages.registry import build_picture
-from rigidsim.look.stages.uncertainty import COVARIANCE, AxisUncertainty
+from rigidsim.look.stages.uncertainty import CONE, COVARIANCE, AxisUncertainty
 
 Top = Callable[..., xarray.Dataset]
 Z = np.array([0.0, 0.0, 1.0])
@@ -55,16 +55,16 @@ def test_a_cone_that_stays_in_space_turns_against_the_body_that_carries_it(symme
     top = symmetric_top(count=101)
     sigma = 0.3  # about X of space alone: the axis moves across X, whatever the body does
     picture, subject = build_picture(with_covariance(top, np.tile(np.diag([sigma**2, 0, 0]), (101, 1, 1))))
-    (cone,) = picture.stages[0].cones
+    (cone,) = [part for part in picture.stages[0].parts if part.path == f"{CONE}/surface"]
     assert subject.attitude is not None
     axis, about = subject.attitude @ Z, np.array([1.0, 0.0, 0.0])
     sideways = np.cross(about, axis)
-    in_space = np.einsum("tij,tkj->tki", subject.attitude, cone.rim)
+    in_space = np.einsum("tij,tkj->tki", subject.attitude, cone.values)
     flat = np.cross(axis, sideways)  # across which nothing moves: the cone is a fan
     np.testing.assert_allclose(np.einsum("tki,ti->tk", in_space, flat), 0.0, atol=1e-7)
     moved = np.linalg.norm(np.cross(in_space, axis[:, None]), axis=2)
     angle = np.arctan2(moved, np.einsum("tki,ti->tk", in_space, axis))
     np.testing.assert_allclose(angle.max(axis=1), sigma * np.linalg.norm(sideways, axis=1), rtol=1e-3)
     # it is the cone of this space axis at each time, so in the body it goes round
-    first = cone.rim[:, int(np.argmax(angle[0]))]
+    first = cone.values[:, int(np.argmax(angle[0]))]
     assert np.ptp(np.arctan2(first[:, 1], first[:, 0])) > 3.0

@@ -55,12 +55,12 @@ def test_random_fields(seed: int) -> None:
     assert scene_of(dataset).vertical == pytest.approx(up, abs=1e-12)
     assert ("tip" in available(dataset)) == (kind == "top")
     picture = build_picture(dataset)[0]
-    drawn = [vector for stage in picture.stages for vector in stage.vectors if vector.name == "gravity"]
+    drawn = [part for stage in picture.stages for part in stage.parts if part.words == "gravity"]
     titles = {"top": "top on a fixed point", "flight": "flight in a uniform gravity"}
     assert (picture.kind == titles.get(kind)) == (kind != "balanced")
     assert len(drawn) == (kind != "balanced")
-    for vector in drawn:
-        way = vector.along / np.linalg.norm(vector.along)
+    for part in drawn:
+        way = part.values / np.linalg.norm(part.values)
         assert way == pytest.approx(-up, abs=1e-9)
 
 
@@ -77,7 +77,7 @@ def test_many_sources(seed: int) -> None:
     ]
     scene = json.loads(dataset.attrs["scene"]) | {"objects": objects}
     dataset = dataset.assign_attrs(scene=json.dumps(scene))
-    drawn = {arrow.name: arrow.vectors[0] for arrow in source_arrows(dataset, 1.0)}
+    drawn = {part.path[7:]: part.values[0] for part in source_arrows(dataset, 1.0)}
     tides = strengths / np.linalg.norm(places, axis=1) ** 3
     seen = np.flatnonzero(tides >= 1e-3 * tides.max())
     assert set(drawn) == {f"source{k}" for k in seen}

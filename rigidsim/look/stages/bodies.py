@@ -1,6 +1,6 @@
 """A body as stages draw it: meshes in units of its reach, arrows and trails of its motion, the camera."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -11,15 +11,17 @@ from rigidsim.look.record import called, color_of, named_body, scene_of
 from rigidsim.look.signals import values
 from rigidsim.look.solids import Mesh, ball, body_meshes, point_positions, rotation_matrix
 from rigidsim.look.stages import parts
-from rigidsim.look.stages.parts import Array, Arrow, Camera, Stage, Trail
+from rigidsim.look.stages.parts import BODY, CENTRE, Array, Camera, Part, Stage, arrow, trail
 from rigidsim.scene.bodies.presets import KnownBody
 
 FIELD = np.deg2rad(55.0)  # field of view from bottom to top (rad), the viewer's own
 USUAL_VIEW = (float(np.deg2rad(24.0)), float(np.deg2rad(-55.0)))
 """Elevation and azimuth (rad) of the eye where nothing asks for another."""
 NEAR = 6.0  # reaches: a body that moves further gets a track view of its own
+ORIGIN = "origin"
 DISTANT = 30.0  # extents from the origin, beyond which the picture has an origin of its own
 _WEAK = 1e-3  # of the strongest tide
+_SUN, _MOON = 0.11, 0.07  # radii of the balls that stand for sources, in radii of the globe
 TRACK_BODY = 0.08  # reach of the enlarged body in the track view
 _FLAT = 0.12  # of the other extents, below which a body is a plate
 
@@ -59,32 +61,26 @@ class Subject:
             solids=solids,
         )
 
-    def stage(self, arrows: list[Arrow], trails: list[Trail], title: str = "") -> Stage:
-        """A stage with the body at the origin, to scale."""
-        return Stage(
-            root="scene",
-            title=title or ("Body in space" if self.attitude is not None else "Body axes"),
-            unit=self.reach,
-            meshes=self.meshes,
-            points=self.points,
-            axis_length=parts.AXIS_REACH,
-            quaternion=None if self.quaternion is None else parts.viewer_quaternion(self.quaternion),
-            arrows=arrows,
-            trails=trails,
-        )
+    def stage(
+        self, shown: list[Part], title: str = "", *, root: str = "scene", size: float = 1.0,
+        unit: float = 0.0, track: Array | None = None, axes: float = parts.AXIS_REACH, **more: Any,
+    ) -> Stage:  # fmt: skip
+        """A stage with the body, at the origin or on its track (rows, 3), to scale or with a reach of `size`
+        in a unit of so many metres, and other parts; the rest is as of ``parts.Stage``.
+        """
+        turning = None if self.quaternion is None else parts.viewer_quaternion(self.quaternion)
+        placed = parts.frame(BODY, translation=track, quaternion=turning)
+        if track is not None and any(part.path.startswith(CENTRE) for part in shown):
+            placed += parts.frame(CENTRE, translation=track)
+        drawn = parts.body([mesh.scaled(size) for mesh in self.meshes], size * self.points, axes)
+        title = title or ("Body in space" if self.attitude is not None else "Body axes")
+        whole = [*drawn, *placed, *shown]
+        return Stage(root, title, unit or self.reach, whole, size if self.meshes else 0.0, track, **more)
 
-    def enlarged(self, size: float, title: str, unit: float, path: Array, words: str) -> Stage:
-        """A stage with the path (rows, 3) of the body, which is drawn with a reach of `size`."""
-        return Stage(
-            root="path",
-            title=title,
-            unit=unit,
-            meshes=[mesh.scaled(size) for mesh in self.meshes],
-            points=self.points * size,
-            quaternion=None if self.quaternion is None else parts.viewer_quaternion(self.quaternion),
-            translation=path,
-            trails=[Trail("track", parts.TRACK, path, words=words)],
-        )
+    def enlarged(self, shown: list[Part], title: str, size: float, words: str, **more: Any) -> Stage:
+        """A stage with the track of the body, which is drawn with a reach of `size`, and other parts."""
+        drawn = [*trail("track", parts.TRACK, more["track"], words), *shown]
+        return self.stage(drawn, title, root="path", size=size, **more)
 
     @property
     def thin_axis(self) -> Array | None:
@@ -99,72 +95,75 @@ def _sphere(body: KnownBody) -> dict[str, Any]:
 
 
 def vectors_of(
-    dataset: xarray.Dataset, subject: Subject, *, paths: bool = True
-) -> tuple[list[Arrow], list[Trail], list[str]]:
-    """Angular momentum and velocity, if wanted the paths of the latter's tip, and notes on their scales."""
-    arrows: list[Arrow] = []
-    trails: list[Trail] = []
+    dataset: xarray.Dataset, subject: Subject, *, paths: bool = True, longer: tuple[float, float] = (1.0, 1.0)
+) -> tuple[list[Part], list[str]]:
+    """Angular momentum and velocity, `longer` than others by these factors, if wanted the paths of the
+    latter's tip, and notes on their scales.
+    """
+    shown: list[Part] = []
     notes: list[str] = []
     attitude = subject.attitude
+    place = BODY if attitude is None else CENTRE
+
+    def placed(vectors: Array) -> Array:
+        return vectors if attitude is None else np.einsum("tij,tj->ti", attitude, vectors)
+
     momentum = values(dataset, "angular_momentum", 3)
     if momentum is not None and attitude is not None and parts.longest(momentum) > 0:
         factor = parts.ARROW_REACH / parts.longest(momentum)
         words = "angular momentum L"
-        arrows.append(
-            Arrow("angular_momentum", "L", parts.MOMENTUM, momentum * factor, False, words, label_at=1.09)
-        )
+        drawn = longer[0] * factor * momentum
+        shown.append(arrow("angular_momentum", "L", parts.MOMENTUM, drawn, words, label_at=1.09))
         notes.append(f"{words} (yellow), space axes: 1 unit = {1 / factor:.6g} kg m²/s")
     rates = values(dataset, "angular_velocity", 3)
-    if rates is not None and parts.longest(rates) > 0:
-        factor = parts.ARROW_REACH / parts.longest(rates)
-        in_body = rates * factor
-        tip = in_body if attitude is None else np.einsum("tij,tj->ti", attitude, in_body)
-        words, at = "angular velocity ω", 0.93 if arrows else 1.07
-        arrows.append(
-            Arrow("angular_velocity", "ω", parts.VELOCITY, tip, attitude is None, words, label_at=at)
-        )
-        notes.append(f"{words} (cyan): 1 unit = {1 / factor:.6g} rad/s")
-        core = values(dataset, "core_angular_velocity", 3)
-        if core is not None:
-            shown = core * factor if attitude is None else np.einsum("tij,tj->ti", attitude, core * factor)
-            words = "angular velocity of the core"
-            arrows.append(
-                Arrow("core_angular_velocity", "core", parts.OF_CORE, shown, attitude is None, words)
-            )
-            notes.append(f"{words} (orange), in the same unit")
-        if paths:
-            words = "polhode: ω's path in the body"
-            trails.append(Trail("polhode", parts.POLHODE, in_body, in_body=True, words=words))
-            notes.append("polhode (pink): the path of the tip of ω in body axes, carried by the body")
-        if paths and attitude is not None:
-            words = "herpolhode: ω's path in space"
-            trails.append(Trail("herpolhode", parts.VELOCITY, tip, with_centre=True, words=words))
-            notes.append("herpolhode (cyan): the path of the tip of ω in space axes")
-    if trails:
+    if rates is None or not parts.longest(rates) > 0:
+        return shown, notes
+    factor = parts.ARROW_REACH / parts.longest(rates)
+    tip, words, at = placed(factor * rates), "angular velocity ω", 0.93 if shown else 1.07
+    shown.append(
+        arrow("angular_velocity", "ω", parts.VELOCITY, longer[1] * tip, words, place=place, label_at=at)
+    )
+    notes.append(f"{words} (cyan): 1 unit = {1 / factor:.6g} rad/s")
+    core = values(dataset, "core_angular_velocity", 3)
+    if core is not None:
+        words = "angular velocity of the core"
+        drawn = placed(factor * core)
+        shown.append(arrow("core_angular_velocity", "core", parts.OF_CORE, drawn, words, place=place))
+        notes.append(f"{words} (orange), in the same unit")
+    if paths:
+        words = "polhode: ω's path in the body"
+        shown += trail("polhode", parts.POLHODE, factor * rates, words, place=BODY)
+        notes.append("polhode (pink): the path of the tip of ω in body axes, carried by the body")
+    if paths and attitude is not None:
+        words = "herpolhode: ω's path in space"
+        shown += trail("herpolhode", parts.VELOCITY, tip, words, place=CENTRE)
+        notes.append("herpolhode (cyan): the path of the tip of ω in space axes")
+    if paths:
         notes.append("trails: bright for the time just passed, dark for the whole run")
-    return arrows, trails, notes
+    return shown, notes
 
 
-def source_arrows(dataset: xarray.Dataset, length: float) -> list[Arrow]:
-    """Directions in space to attracting bodies, without those whose tide is a thousandth of the strongest."""
+def source_arrows(dataset: xarray.Dataset, length: float, *, balls: bool = False) -> list[Part]:
+    """Directions in space to attracting bodies, without those whose tide is a thousandth of the strongest;
+    with `balls` at the tips, the Sun's the larger, not to scale.
+    """
     pulling = sources.sources(dataset)
     strongest = max((one.tide for one in pulling), default=0.0)
     arrows = []
     for one in [*sources.point_masses(dataset), *(x for x in pulling if x.tide >= _WEAK * strongest)]:
         way = length * one.path / signals.norms(one.path)[:, None]
         name, color = called(one.body, one.name), color_of(one.body, parts.SOURCE)
-        arrows.append(Arrow(one.key, f"to {name}", color, way, False, f"direction of {name}"))
+        ball = {"the Sun": _SUN}.get(name, _MOON) if balls else 0.0
+        words, at = f"direction of {name}", 1.05 if balls else 1.07
+        arrows.append(arrow(one.key, f"to {name}", color, way, words, label_at=at, ball=ball))
     return arrows
 
 
-def eye_at(
-    elevation: float, azimuth: float, radius: float, target: Array | None = None, *, narrow: bool = False
-) -> Camera:
-    """A camera that sees a ball from an elevation and azimuth (rad), Z up; a narrow view from further off."""
-    direction = direction_of(elevation, azimuth)
+def eye_at(elevation: float, azimuth: float, radius: float, target: Array | None = None) -> Camera:
+    """A camera that sees a ball from an elevation and azimuth (rad), Z up."""
     target = np.zeros(3) if target is None else target
-    distance = radius / np.sin(FIELD / 2) * (1.08 if narrow else 1.0)
-    return Camera(target + distance * direction, target, np.array([0.0, 0.0, 1.0]))
+    place = target + radius / np.sin(FIELD / 2) * direction_of(elevation, azimuth)
+    return Camera(place, target, np.array([0.0, 0.0, 1.0]))
 
 
 def direction_of(elevation: float, azimuth: float) -> Array:
@@ -173,32 +172,26 @@ def direction_of(elevation: float, azimuth: float) -> Array:
     return np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)])
 
 
-def camera(stage: Stage, *, narrow: bool = False, subject: Subject | None = None) -> Camera:
-    """The stage's own camera, or one from which the leading arrow lies across the picture; further back in a
-    narrow view, about as wide as high. A plate is seen so that its face shows most of the time.
+def suited_camera(stage: Stage, subject: Subject) -> Camera:
+    """One from which the leading arrow lies across the picture, and the face of a plate shows most of the
+    time.
     """
-    if stage.camera is not None:
-        if not narrow:
-            return stage.camera
-        back = stage.camera.target + 1.08 * (stage.camera.position - stage.camera.target)
-        return Camera(back, stage.camera.target, stage.camera.up)
-    target, radius = np.zeros(3), 1.12 * parts.ARROW_REACH if stage.arrows or stage.cones else 1.3
-    if stage.translation is not None:
-        low, high = np.nanmin(stage.translation, axis=0), np.nanmax(stage.translation, axis=0)
-        target = (low + high) / 2
-        margin = parts.ARROW_REACH if stage.arrows else 0.16
-        radius = float(np.linalg.norm(high - low)) / 2 + margin
+    arrows = [part for part in stage.parts if part.is_arrow]
+    target, radius = np.zeros(3), 1.12 * parts.ARROW_REACH if arrows else 1.3
     elevation, azimuth = USUAL_VIEW
-    if stage.translation is not None and not stage.arrows:
-        elevation, azimuth = plane_view(stage.translation)
-    space = [arrow for arrow in stage.arrows if not arrow.in_body] or stage.arrows
+    if stage.track is not None:
+        low, high = np.nanmin(stage.track, axis=0), np.nanmax(stage.track, axis=0)
+        target = (low + high) / 2
+        radius = float(np.linalg.norm(high - low)) / 2 + (parts.ARROW_REACH if arrows else 0.16)
+        elevation, azimuth = USUAL_VIEW if arrows else plane_view(stage.track)
+    space = [part for part in arrows if not part.path.startswith(BODY)] or arrows
     if space:
-        leading = np.nanmean(space[0].vectors, axis=0)
+        leading = np.nanmean(space[0].values, axis=0)
         if np.hypot(leading[0], leading[1]) > 0.3 * np.linalg.norm(leading):
             azimuth = np.arctan2(leading[1], leading[0]) - np.deg2rad(48.0)
-    if subject is not None and subject.attitude is not None and subject.thin_axis is not None:
+    if subject.attitude is not None and subject.thin_axis is not None:
         elevation, azimuth = _facing(subject.attitude @ subject.thin_axis)
-    return eye_at(elevation, azimuth, radius, target, narrow=narrow)
+    return eye_at(elevation, azimuth, radius, target)
 
 
 def _facing(normals: Array) -> tuple[float, float]:
@@ -223,13 +216,13 @@ def plane_view(points: Array) -> tuple[float, float]:
     return float(elevation), float(azimuth)
 
 
-def with_track(subject: Subject, body: Stage, notes: list[str]) -> list[Stage]:
+def with_track(subject: Subject, shown: list[Part], notes: list[str]) -> list[Stage]:
     """The body's stage, and a second one with its track if it moves by more than `NEAR` reaches: that can't
     be shown to its scale, so that the body stays at the centre of the first and is enlarged on the second.
     """
     position, reach = subject.position, subject.reach
     if position is None:
-        return [body]
+        return [subject.stage(shown)]
     extent = float(np.nanmax(np.linalg.norm(position - position[0], axis=1)))
     middle = (np.nanmin(position, axis=0) + np.nanmax(position, axis=0)) / 2
     # Far from the origin float32 would make the body jitter: then the picture has its own origin.
@@ -237,20 +230,16 @@ def with_track(subject: Subject, body: Stage, notes: list[str]) -> list[Stage]:
     center = middle if distant else np.zeros(3)
     if distant:
         notes.append("the origin of the picture is at {:.9g}, {:.9g}, {:.9g} m".format(*center))
-    near = extent <= NEAR * reach
+    near, words = extent <= NEAR * reach, "track of the centre of mass"
     unit = reach if near else max(float(np.nanmax(np.abs(position - center))), reach)
-    translation = (position - center) / unit
+    track = (position - center) / unit
     if near:
-        track = Trail("track", parts.TRACK, translation, words="track of the centre of mass")
-        return [replace(body, translation=translation, trails=[*body.trails, track])]
+        return [subject.stage([*shown, *trail("track", parts.TRACK, track, words)], track=track)]
     enlarged = TRACK_BODY * unit / reach
     notes.append(
         f"the body view follows the body; in the track view 1 unit = {unit:.6g} m "
         f"and the body is drawn {enlarged:.3g} times too large"
     )
-    path = replace(
-        subject.enlarged(TRACK_BODY, "Track in space", unit, translation, "track of the centre of mass"),
-        axis_length=2 * TRACK_BODY,
-        origin=not distant,
-    )
-    return [body, path]
+    origin = [] if distant else [parts.spot(ORIGIN, ORIGIN, (230, 230, 230), np.zeros(3), size=5.0)]
+    size, more = TRACK_BODY, {"unit": unit, "track": track, "axes": 2 * TRACK_BODY}
+    return [subject.stage(shown), subject.enlarged(origin, "Track in space", size, words, **more)]

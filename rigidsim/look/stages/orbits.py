@@ -11,7 +11,18 @@ from rigidsim.look.solids import globe, graticule, rotation_matrix
 from rigidsim.look.sources import kepler_path, orbit_normal
 from rigidsim.look.stages import bodies, parts
 from rigidsim.look.stages.bodies import FIELD, Subject, direction_of, plane_view, vectors_of
-from rigidsim.look.stages.parts import SPACE, Array, Arrow, Camera, Line, Picture, Solid, Spot, Stage, Vector
+from rigidsim.look.stages.parts import (
+    BODY,
+    Array,
+    Camera,
+    Picture,
+    Stage,
+    around,
+    arrow,
+    fixed_arrow,
+    lines,
+    trail,
+)
 from rigidsim.scene.bodies.presets import KnownBody
 from rigidsim.scene.rotations import quaternion_of
 
@@ -33,15 +44,15 @@ def free_orbit(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
         return None
     position = subject.position - np.asarray(listed[0]["position"], dtype=float)
     planet = body_of(listed[0])
-    arrows, trails, notes = vectors_of(dataset, subject, paths=False)
+    shown, notes = vectors_of(dataset, subject, paths=False)
     name = called(planet, "attracting point")
     down = -position / np.linalg.norm(position, axis=1, keepdims=True)
-    arrows.append(Arrow("nadir", f"to {name}", parts.SOURCE, 1.6 * down, False, f"direction of {name}"))
+    shown.append(arrow("nadir", f"to {name}", parts.SOURCE, 1.6 * down, f"direction of {name}"))
     air = signals.values(dataset, "air_velocity", 3)
     if air is not None:
         oncoming = 1.6 * air / signals.norms(air)[:, None]
-        arrows.append(Arrow("air", "air", FORWARD, oncoming, True, "where the air comes from"))
-    close = subject.stage(arrows, trails, "Body, seen in space axes")
+        shown.append(arrow("air", "air", FORWARD, oncoming, "where the air comes from", place=BODY))
+    close = subject.stage(shown, "Body, seen in space axes")
     stages = [close, _orbit(subject, position, planet, notes)]
     return Picture("orbit about an attracting point", stages, notes)
 
@@ -135,16 +146,16 @@ def _orbit(
     name = planet.name if planet is not None else "attracting point"
     title = f"Orbit about {called(planet, 'attracting point')}"
     rings = graticule(np.full(3, radius)) if radius > 0.1 else []
-    return replace(
-        subject.enlarged(ORBIT_BODY, title, unit, places, "orbit"),
-        solids=[Solid("planet", globe(np.full(3, radius), color_of(planet)))],
-        spots=[Spot("planet", name, parts.PALE, np.array([0.0, 0.0, radius + 0.14]))],
-        lines=[
-            *(Line(f"graticule/{k}", (20, 24, 30), ring, SPACE, 0.7, 0.5) for k, ring in enumerate(rings)),
-            *([] if whole is None else [Line("revolution", parts.FAINT, whole / unit, SPACE, 1.2, 0.7)]),
-        ],
-        camera=Camera(1.3 / np.sin(FIELD / 2) * direction, np.zeros(3), np.array([0.0, 0.0, 1.0])),
-    )
+    up = np.array([0.0, 0.0, 1.0])
+    shown = [parts.solid(around("", "planet"), globe(np.full(3, radius), color_of(planet)))]
+    shown.append(parts.spot("planet/label", name, parts.PALE, (radius + 0.14) * up))
+    if rings:
+        shown.append(lines("graticule/0", (20, 24, 30), rings, width=0.7, strength=0.5))
+    if whole is not None:
+        shown.append(lines("revolution", parts.FAINT, [whole / unit], strength=0.7))
+    camera = Camera(1.3 / np.sin(FIELD / 2) * direction, np.zeros(3), up)
+    more = {"unit": unit, "track": places, "axes": 0.0, "camera": camera}
+    return subject.enlarged(shown, title, ORBIT_BODY, "orbit", **more)
 
 
 def _in_local_frame(
@@ -162,32 +173,25 @@ def _in_local_frame(
     tip = 1.3 * np.einsum("tij,tj->ti", relative, np.broadcast_to(axis, (len(relative), 3)))
     name = f"to {called(planet, 'source')}"
     words = f"trace of the body axis that points {name if far else 'down'}"
-    trails = [parts.Trail("local/axis_trace", parts.FIGURE, tip, words=words, head=True)]
-    center = np.array([0.0, 0.0, _BELOW + _HORIZON])
-    surface = globe(np.full(3, _HORIZON), color_of(planet))
-    vectors = [
-        ("nadir", name, parts.SOURCE, (0, 0, 1.75), f"nadir: {name}"),
-        ("forward", "forward", FORWARD, (1.75, 0, 0), "along the orbit"),
-        ("normal", "normal", NORMAL, (0, -1.6, 0), "the orbit's normal"),
+    start = np.zeros(3)
+    shown = [
+        *parts.frame("local", quaternion=parts.viewer_quaternion(quaternion_of(local))),
+        *fixed_arrow("nadir", name, parts.SOURCE, start, [0, 0, 1.75], f"nadir: {name}", place="local"),
+        *fixed_arrow("forward", "forward", FORWARD, start, [1.75, 0, 0], "along the orbit", place="local"),
+        *fixed_arrow("normal", "normal", NORMAL, start, [0, -1.6, 0], "the orbit's normal", place="local"),
+        *trail("axis_trace", parts.FIGURE, tip, words, place="local", head=True),
     ]
+    if not far:
+        center, sizes = np.array([0.0, 0.0, _BELOW + _HORIZON]), np.full(3, _HORIZON)
+        surface = globe(sizes, color_of(planet)).moved(np.eye(3), center)
+        rings = [ring + center for ring in graticule(sizes, 15.0)]
+        shown.append(parts.solid(around("local", "horizon"), surface))
+        shown.append(lines("horizon/0", parts.FAINT, rings, place="local", width=0.6, strength=0.35))
     eye = np.array([2.0, -4.3, -1.35])
     eye = eye / np.linalg.norm(eye) * 2.15 / np.sin(FIELD / 2)
     target = np.array([0.0, 0.0, 0.35])
-    return replace(
-        subject.stage([], trails, "Body in the local frame"),
-        solids=[] if far else [Solid("horizon", surface.moved(np.eye(3), center), "local")],
-        lines=[
-            Line(f"horizon/{k}", parts.FAINT, line + center, "local", 0.6, 0.35)
-            for k, line in enumerate([] if far else graticule(np.full(3, _HORIZON), 15.0))
-        ],
-        vectors=[
-            Vector(key, label, color, np.zeros(3), np.array(way), "local", words)
-            for key, label, color, way, words in vectors
-        ],
-        frames={"local": parts.viewer_quaternion(quaternion_of(local))},
-        looked_from="local",
-        camera=Camera(target + eye, target, np.array([0.0, 0.0, -1.0])),
-    )
+    camera = Camera(target + eye, target, np.array([0.0, 0.0, -1.0]))
+    return subject.stage(shown, "Body in the local frame", looked_from="local", camera=camera)
 
 
 def flight(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
@@ -195,36 +199,39 @@ def flight(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     pull, position = scene_of(dataset).gravity, subject.position
     if pull is None or position is None or scene_of(dataset).attractors:
         return None
-    arrows, trails, notes = vectors_of(dataset, subject, paths=False)
-    *others, path = bodies.with_track(subject, subject.stage(arrows, trails), notes)
-    assert path.translation is not None
+    shown, notes = vectors_of(dataset, subject, paths=False)
+    *others, path = bodies.with_track(subject, shown, notes)
+    assert path.track is not None
     up = scene_of(dataset).vertical
-    points = signals.finite_rows(path.translation)
+    points = signals.finite_rows(path.track)
+    kept = [part for part in path.parts if not part.path.startswith(f"{BODY}/axes")]
+    origin = around("", bodies.ORIGIN)
+    marked = any(part.path == origin for part in kept)
     heights = points @ up
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     extent = max(float(np.linalg.norm(np.ptp(points, axis=0))), 0.3)
     # The ground is where heights count from, where that is near the path, or else just under it.
-    above = path.origin and -0.05 * extent <= heights.min() <= extent
+    above = marked and -0.05 * extent <= heights.min() <= extent
     level = 0.0 if above else heights.min() - 0.15 * extent
     floor = middle - (middle @ up) * up + level * up
     first, second = _level_axes(points, up)
     size = 0.75 * extent
     high = max(float(heights.max()) - level, 0.3 * extent)
     place = floor - 0.85 * size * first + 0.9 * high * up
-    words = "gravity"
-    gravity = Vector("gravity", words, parts.PULL, place, -0.45 * high * up, SPACE, words, 0.012 * extent)
     center = floor + 0.5 * high * up
     direction = -second * 0.93 + 0.2 * first + 0.32 * up
     direction /= np.linalg.norm(direction)
+    along, radius, words = -0.45 * high * up, 0.012 * extent, "gravity"
     stage = replace(
         path,
         title="Flight" if others else path.title,
-        lines=parts.grid("ground", floor, first, second, size, 5, 0.5),
-        vectors=[gravity],
-        spots=[Spot("start", "start", parts.PALE, points[0], SPACE, 4.0)],
-        origin=path.origin and level == 0.0,
+        parts=[
+            *(part for part in kept if level == 0.0 or part.path != origin),
+            *fixed_arrow(words, words, parts.PULL, place, along, words, radius=radius),
+            parts.grid("ground", floor, first, second, size, 5, 0.5),
+            parts.spot("start", "start", parts.PALE, points[0], size=4.0),
+        ],
         camera=Camera(center + 0.82 * extent / np.sin(FIELD / 2) * direction, center, up),
-        axis_length=0.0,
     )
     return Picture("flight in a uniform gravity", [stage, *others], notes)
 

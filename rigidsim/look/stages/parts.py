@@ -1,21 +1,28 @@
-"""Parts of a stage as numbers: what is drawn, where, in which unit.
+"""Stages and their parts: what is drawn, where, in which unit, as entities of the viewer.
 
 The viewer works in float32, so everything is brought to units of order one here, in float64: lengths in units
 of the body's reach (largest distance of a drawn point from the reference point) or of an orbit, arrows by one
-constant factor each.
+constant factor each. A part has its path below the root of its stage, what holds for all times, and columns
+of what changes.
 """
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import rerun as rr
 import xarray
 from numpy.typing import NDArray
 
 from rigidsim.look.plots import Plot
 from rigidsim.look.signals import across, finite_rows, joined, norms, seconds, values
-from rigidsim.look.solids import Array, Color, Mesh
+from rigidsim.look.solids import Array, Color, Mesh, sharp_edges
 from rigidsim.look.thinning import thinned_indices
+
+Rows = slice | NDArray[np.int64]
+Columns = Iterable[rr.ComponentColumn]
 
 SPACE, BODY, CENTRE = "", "body", "centre"
 """Where a part is attached: to space, to the body, to its reference point, or to a frame by its name."""
@@ -29,6 +36,9 @@ _LEAST_SECONDS, _MOST_SECONDS = 10.0, 60.0  # that playing a whole run takes
 _TURN_SECONDS = 3.0  # per turn of the body, when the run has few enough turns for it
 _STILL = 0.01  # of an arrow's length, by which it may move between rows that are drawn
 _SMOOTH = 0.2  # of a trail's radius, between its corners: some thirty a turn
+_DIM = 0.26  # of a trail's brightness: the whole curve
+_EDGE: Color = (12, 14, 20)
+_AXIS_COLORS = [(235, 70, 60), (90, 200, 90), (80, 130, 250)]
 
 MOMENTUM: Color = (255, 196, 40)
 VELOCITY: Color = (90, 215, 235)
@@ -43,124 +53,38 @@ FIGURE: Color = (120, 165, 255)
 
 
 @dataclass(frozen=True)
-class Arrow:
-    """A vector along time: (rows, 3) in stage units, from the reference point, fixed to space or the body.
-    Those with `words` are in the legend; the label stands at so many lengths, with a ball of some radius.
+class Part:
+    """An entity of a stage.
+
+    Attributes:
+        path: below the stage's root.
+        static: what holds for all times. columns: of given rows, what changes; None if nothing does.
+        values: (rows, ...) of what changes, or of what stands, in units of the stage.
+        words, color: in the legend, if there are words.
+        stride: between rows that are drawn; only: the rows that are drawn, if not those.
+        lasting: rows in the bright end of a trail; 0 for those of any other; None of what is no trail.
     """
 
-    name: str
-    label: str
-    color: Color
-    vectors: Array
-    in_body: bool
+    path: str
+    static: Sequence[rr.AsComponents] = ()
+    columns: Callable[[Rows], Columns] | None = None
+    values: Array = field(default_factory=lambda: np.empty(0))
     words: str = ""
-    label_at: float = 1.07
-    radius: float = 0.024
-    ball: float = 0.0
-
-    @cached_property
-    def stride(self) -> int:
-        """Stride between drawn rows."""
-        return _stride_of(self.vectors, _STILL)
-
-
-@dataclass(frozen=True)
-class Trail:
-    """A moving point along time: (rows, 3) in stage units; with `head` it is marked itself."""
-
-    name: str
-    color: Color
-    points: Array
-    in_body: bool = False
-    with_centre: bool = False
-    words: str = ""
-    head: bool = False
-    lasting: int = 0  # rows in its bright part, of one that isn't drawn whole; 0 for those of any other
-
-    @cached_property
-    def whole(self) -> Array:
-        """Its thinned path (points, 3)."""
-        return finite_rows(self.points[thinned_indices(len(self.points), CURVE_POINTS)])
-
-    @cached_property
-    def line(self) -> bool:
-        """Whether neighbours are close enough to be joined."""
-        return joined(self.points, NEAR)
-
-    @cached_property
-    def stride(self) -> int:
-        """Stride between the ends of its pieces; a cloud of points needs no more of them."""
-        if self.line:
-            return _stride_of(self.points - self.whole.mean(axis=0), _SMOOTH)
-        return -(-len(self.points) // SCENE_ROWS)
-
-
-@dataclass(frozen=True)
-class Line:
-    """A curve (points, 3) that doesn't change, in units of the stage, `width` points of the screen wide."""
-
-    name: str
-    color: Color
-    points: Array
-    place: str = SPACE
-    width: float = 1.2
-    strength: float = 1.0
-    words: str = ""
-
-
-@dataclass(frozen=True)
-class Spot:
-    """A labelled point (3,) that doesn't change; `size` points of the screen, 0 for the label alone."""
-
-    name: str
-    label: str
-    color: Color
-    position: Array
-    place: str = SPACE
-    size: float = 0.0
-
-
-@dataclass(frozen=True)
-class Vector:
-    """An arrow that doesn't change, from `start` (3,) along `along` (3,), in units of the stage."""
-
-    name: str
-    label: str
-    color: Color
-    start: Array
-    along: Array
-    place: str = SPACE
-    words: str = ""
-    radius: float = 0.018
-
-
-@dataclass(frozen=True)
-class Solid:
-    """A mesh placed on the stage, in its units; with a colour a translucent one."""
-
-    name: str
-    mesh: Mesh
-    place: str = SPACE
-    clear: Color | None = None
-
-
-@dataclass(frozen=True)
-class Cone:
-    """A translucent cone along time, from the reference point to the corners (rows, corners, 3) of its rim,
-    stage units, body axes; the body carries it. A double one has another to the other side; one whose rim is
-    at the reference point isn't seen.
-    """
-
-    name: str
-    color: Color
-    rim: Array
-    words: str
-    double: bool = True
+    color: Color = PALE
+    stride: int = 1
+    only: NDArray[np.int64] | None = None
+    lasting: int | None = None
 
     @property
-    def rims(self) -> list[Array]:
-        """Its rim, and of a double cone the other side's rim."""
-        return [self.rim, -self.rim] if self.double else [self.rim]
+    def is_arrow(self) -> bool:
+        """Whether it is an arrow that moves."""
+        return self.columns is not None and isinstance(next(iter(self.static), None), rr.Arrows3D)
+
+    def picked(self, rows: slice) -> Rows:
+        """Which of some rows are drawn."""
+        if self.only is not None:
+            return self.only[(rows.start <= self.only) & (self.only < rows.stop)]
+        return slice(-(-rows.start // self.stride) * self.stride, rows.stop, self.stride)
 
 
 @dataclass(frozen=True)
@@ -174,29 +98,25 @@ class Camera:
 
 @dataclass(frozen=True)
 class Stage:
-    """One scene to be drawn under the entity `root`."""
+    """One scene to be drawn under the entity `root`.
+
+    Attributes:
+        unit: metres per unit of length.
+        size: reach of its body; 0 without one. track: (rows, 3) of that's reference point, if it moves.
+        looked_from: frame that the camera is in; empty for space.
+        flat: that frame is stretched along its x axis, as for an eye far away on it.
+        camera: None for the one that suits arrows and track.
+    """
 
     root: str
     title: str
-    unit: float  # metres per unit of length
-    meshes: list[Mesh] = field(default_factory=list)  # of the body, body axes, stage units
-    points: Array = field(default_factory=lambda: np.zeros((0, 3)))  # masses, joined to the reference point
-    axis_length: float = 0.0  # of the body axes; 0 for none
-    quaternion: NDArray[np.float32] | None = None  # (rows, 4) x y z w; None: no attitude
-    translation: Array | None = None  # (rows, 3), of the reference point; None: it stays at the origin
-    arrows: list[Arrow] = field(default_factory=list)
-    trails: list[Trail] = field(default_factory=list)
-    origin: bool = False  # whether the origin of space is in the picture and marked
-    lines: list[Line] = field(default_factory=list)
-    spots: list[Spot] = field(default_factory=list)
-    vectors: list[Vector] = field(default_factory=list)
-    solids: list[Solid] = field(default_factory=list)
-    cones: list[Cone] = field(default_factory=list)
-    frames: dict[str, NDArray[np.float32]] = field(default_factory=dict)  # quaternions of others, by name
-    looked_from: str = ""  # frame that the camera is in; empty for space
-    flat: bool = False  # that frame is stretched along its x axis, as for an eye far away on it
-    turns_with: str = ""  # root of a stage whose body turns alike about the same point (written once)
-    camera: Camera | None = None  # None for the one that suits arrows and path
+    unit: float
+    parts: list[Part]
+    size: float = 0.0
+    track: Array | None = None
+    looked_from: str = ""
+    flat: bool = False
+    camera: Camera | None = None
 
 
 @dataclass(frozen=True)
@@ -209,6 +129,169 @@ class Picture:
     stages: list[Stage]
     notes: list[str] = field(default_factory=list)
     plots: list[Plot] = field(default_factory=list)
+
+
+def points_wide(width: float) -> Any:
+    """A radius in points of the screen."""
+    return rr.Radius.ui_points(width)
+
+
+def around(place: str, name: str) -> str:
+    """Path of what stands around the body, in space or a frame."""
+    return f"{place}/around/{name}".lstrip("/")
+
+
+def frame(name: str, **turning: Array | None) -> list[Part]:
+    """A frame, the body or its reference point, by the `quaternion` (rows, 4), x y z w, `translation` and
+    `scale` (rows, 3) that aren't None.
+    """
+    # in one call: apart, the viewer would see states that never were
+    given = {key: value.astype(np.float32) for key, value in turning.items() if value is not None}
+
+    def columns(rows: Rows) -> Columns:
+        return rr.Transform3D.columns(**{key: value[rows] for key, value in given.items()})
+
+    return [Part(name, (), columns, next(iter(given.values())))] if given else []
+
+
+def arrow(
+    name: str, label: str, color: Color, vectors: Array, words: str = "", *,
+    place: str = CENTRE, label_at: float = 1.07, radius: float = 0.024, ball: float = 0.0,
+) -> Part:  # fmt: skip
+    """A vector (rows, 3) along time, from the reference point, in space or body axes; the label stands at so
+    many lengths, with a ball of some radius.
+    """
+
+    def columns(rows: Rows) -> Columns:
+        drawn = vectors[rows].astype(np.float32)
+        tip = rr.Points3D.columns(positions=drawn * np.float32(label_at)) if label else ()
+        return [*rr.Arrows3D.columns(vectors=drawn), *tip]
+
+    static: list[rr.AsComponents] = [rr.Arrows3D.from_fields(colors=[color], radii=[radius])]
+    if label:  # of the same entity: one of its own would repeat every time
+        named: dict[str, Any] = {"labels": [label], "show_labels": True}
+        static.append(rr.Points3D.from_fields(colors=[color], radii=[ball], **named))
+    stride = _stride_of(vectors, _STILL)
+    return Part(f"{place}/{name}", static, columns, vectors, words, color, stride)
+
+
+def trail(
+    name: str, color: Color, points: Array, words: str = "", *,
+    place: str = SPACE, head: bool = False, lasting: int = 0,
+) -> list[Part]:  # fmt: skip
+    """A point (rows, 3) that moves along time: its whole path, dark, with the time just passed bright; with
+    `head` it is marked itself, and with `lasting` so many rows are drawn alone.
+    """
+    path = f"{place}/{name}".lstrip("/")
+    whole = finite_rows(points[thinned_indices(len(points), CURVE_POINTS)])
+    line = joined(points, NEAR)
+    # a cloud of points needs no more of them
+    stride = _stride_of(points - whole.mean(axis=0), _SMOOTH) if line else -(-len(points) // SCENE_ROWS)
+
+    def dots(rows: Rows) -> Columns:
+        return rr.Points3D.columns(positions=points[rows].astype(np.float32))
+
+    def pieces(rows: Rows) -> Columns:
+        return rr.LineStrips3D.columns(strips=_pieces(points, rows, stride))
+
+    def style(kind: Any, size: float) -> list[rr.AsComponents]:
+        return [kind.from_fields(colors=[color], radii=points_wide(size))]
+
+    found = []
+    if len(whole) > 1 and not lasting:
+        dark = [tuple(round(_DIM * x + (1 - _DIM) * 20) for x in color)]
+        drawn = (
+            rr.LineStrips3D([whole], colors=dark, radii=points_wide(0.8))
+            if joined(whole, NEAR)
+            else rr.Points3D(whole, colors=dark, radii=points_wide(1.0))
+        )
+        found.append(Part(f"{path}/whole", [drawn]))
+    kind, moving = (rr.LineStrips3D, pieces) if line else (rr.Points3D, dots)
+    recent = Part(f"{path}/recent", style(kind, 1.8), moving, points, words, color, stride, lasting=lasting)
+    return [*found, recent, *([Part(f"{path}/head", style(rr.Points3D, 4.5), dots)] if head else [])]
+
+
+def _pieces(points: Array, rows: Rows, stride: int) -> pa.Array:
+    """For each row, a strip from the point `stride` rows before; built at once in Arrow."""
+    ends = np.arange(len(points))[rows]
+    flat = points[np.maximum(ends[:, None] - [stride, 0], 0)].astype(np.float32).ravel()
+    kind = rr.components.LineStrip3DBatch._ARROW_DATATYPE
+    offsets = pa.array(np.arange(len(ends) + 1, dtype=np.int32) * 2)
+    inner = pa.FixedSizeListArray.from_arrays(pa.array(flat), type=kind.value_type)
+    return pa.ListArray.from_arrays(offsets, inner, type=kind)
+
+
+def lines(
+    name: str, color: Color, strips: Sequence[Array], words: str = "", *,
+    place: str = SPACE, width: float = 1.2, strength: float = 1.0,
+) -> Part:  # fmt: skip
+    """Curves (points, 3) that don't change, `width` points of the screen wide, as one entity: the viewer is
+    slowed by entities, not by strips.
+    """
+    drawn = rr.LineStrips3D(
+        [strip.astype(np.float32) for strip in strips],
+        colors=[(*color, round(255 * strength))],
+        radii=points_wide(width / 2),
+    )
+    return Part(around(place, name), [drawn], None, np.concatenate(strips), words, color)
+
+
+def spot(name: str, label: str, color: Color, at: Array, place: str = SPACE, size: float = 0.0) -> Part:
+    """A labelled point (3,) that doesn't change; `size` points of the screen, 0 for the label alone."""
+    radii = points_wide(size) if size else 0.0
+    drawn = rr.Points3D([at], colors=[color], labels=[label], show_labels=True, radii=radii)
+    return Part(around(place, name), [drawn])
+
+
+def fixed_arrow(
+    name: str, label: str, color: Color, start: Array, way: Sequence[float] | Array, words: str = "", *,
+    place: str = SPACE, radius: float = 0.018,
+) -> list[Part]:  # fmt: skip
+    """An arrow that doesn't change, from a point (3,) along a vector (3,)."""
+    along = np.asarray(way, dtype=float)
+    drawn = rr.Arrows3D(vectors=[along], origins=[start], colors=[color], radii=radius)
+    labelled = spot(f"{name}/label", label, color, start + 1.07 * along, place)
+    return [Part(around(place, name), [drawn], None, along, words, color), labelled]
+
+
+def solid(path: str, mesh: Mesh, *, clear: Color | None = None) -> Part:
+    """A mesh, in units of the stage; with a colour a translucent one."""
+    # without normals the viewer shows a mesh's own colours from all sides
+    worn: dict[str, Any] = {"vertex_colors": mesh.colors}
+    if mesh.picture is not None:
+        worn = {"albedo_texture": mesh.picture, "vertex_texcoords": mesh.places}
+    if clear is not None:
+        worn = {"albedo_factor": (*clear, 70), "vertex_normals": mesh.normals.astype(np.float32)}
+    drawn = rr.Mesh3D(
+        vertex_positions=mesh.vertices.astype(np.float32), triangle_indices=mesh.triangles, **worn
+    )
+    return Part(path, [drawn], None, mesh.vertices)
+
+
+def body(meshes: Sequence[Mesh], masses: Array, axes: float) -> list[Part]:
+    """Meshes with their edges, point masses (P, 3) joined to the reference point, and body axes of a length,
+    with their names if they are longer than the body.
+    """
+    found = []
+    for number, mesh in enumerate(meshes):
+        path, edges = f"{BODY}/solids/{number}", sharp_edges(mesh).astype(np.float32)
+        found.append(solid(path, mesh))
+        if len(edges):
+            drawn = rr.LineStrips3D(edges, colors=[_EDGE], radii=points_wide(0.9))
+            found.append(Part(f"{path}/edges", [drawn]))
+    if len(masses):
+        width = 0.014 * (float(np.abs(masses).max()) or 1.0)
+        sticks = np.stack([np.zeros_like(masses), masses], axis=1)
+        drawn = rr.LineStrips3D(sticks, colors=[(190, 190, 190)], radii=width)
+        found.append(Part(f"{BODY}/sticks", [drawn]))
+    if axes:
+        ends = np.eye(3) * axes
+        shafts = rr.Arrows3D(vectors=ends, colors=_AXIS_COLORS, radii=0.011 * axes)
+        found.append(Part(f"{BODY}/axes", [shafts]))
+        # labels of arrows sit at their middle, inside the body: invisible points carry them
+        names = rr.Points3D(ends * 1.07, colors=_AXIS_COLORS, radii=0.0, labels=list("xyz"), show_labels=True)
+        found += [Part(f"{BODY}/axes/labels", [names])] if axes > 1 else []
+    return found
 
 
 def _stride_of(points: Array, share: float) -> int:
@@ -238,7 +321,7 @@ def longest(vectors: Array) -> float:
 def viewer_quaternion(quaternion: Array) -> NDArray[np.float32]:
     """Quaternions (rows, 4) w x y z of any norm in the viewer's form: x y z w, unit, float32."""
     # Normalised in float64 first: the viewer takes the float32 numbers as they are.
-    unit = quaternion / np.sqrt(np.einsum("ij,ij->i", quaternion, quaternion))[:, None]
+    unit = quaternion / norms(quaternion)[:, None]
     return np.ascontiguousarray(unit[:, [1, 2, 3, 0]], dtype=np.float32)
 
 
@@ -251,22 +334,13 @@ def circle(radius: float, normal: Array, center: Array | None = None) -> Array:
 
 
 def grid(
-    name: str,
-    center: Array,
-    first: Array,
-    second: Array,
-    size: float,
-    count: int,
-    strength: float,
-    *,
+    name: str, center: Array, first: Array, second: Array, size: float, count: int, strength: float, *,
     round_: bool = False,
-) -> list[Line]:
+) -> Part:  # fmt: skip
     """Lines of a square or round grid along two unit vectors, so many to either side of its center."""
-    lines = []
-    for k in range(-count, count + 1):
-        at = size * k / count
+    strips = []
+    for at in size * np.arange(-count, count + 1) / count:
         half = np.sqrt(size**2 - at**2) if round_ else size
-        for letter, u, v in (("a", first, second), ("b", second, first)):
-            ends = np.stack([center + at * u - half * v, center + at * u + half * v])
-            lines.append(Line(f"{name}/{letter}{k + count}", FAINT, ends, SPACE, 0.7, strength))
-    return lines
+        for u, v in ((first, second), (second, first)):
+            strips.append(np.stack([center + at * u - half * v, center + at * u + half * v]))
+    return lines(f"{name}/a0", FAINT, strips, width=0.7, strength=strength)

@@ -20,19 +20,7 @@ from rigidsim.look.signals import is_averaged
 from rigidsim.look.solids import Array, globe, graticule, pictured_globe
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import FIELD, Subject, direction_of, eye_at, source_arrows
-from rigidsim.look.stages.parts import (
-    BODY,
-    SPACE,
-    Arrow,
-    Camera,
-    Color,
-    Line,
-    Picture,
-    Spot,
-    Stage,
-    Trail,
-    Vector,
-)
+from rigidsim.look.stages.parts import BODY, Camera, Color, Part, Picture, Stage, arrow, lines, trail
 from rigidsim.scene.bodies.presets import KNOWN, KnownBody
 from rigidsim.scene.readable import DAY, YEAR, span_text
 from rigidsim.scene.rotations import quaternion_of
@@ -43,7 +31,6 @@ _ALIKE = 1e-3  # of a radius, for a body to be taken for one that is known
 _UNKNOWN: Color = (128, 148, 170)
 EQUATOR: Color = (150, 205, 110)
 _X_AXIS_WEST = {"earth_rigid": 14.93}  # deg from Greenwich, of presets whose x axis has the least moment
-_SUN, _MOON = 0.11, 0.07  # radii of the balls that stand for sources, in radii of the globe
 ECLIPTIC: Color = (226, 196, 90)
 PRECESSION: Color = (190, 150, 255)
 POLE_REACH = 1.45  # length of a pole's arrow, in units of the body's reach
@@ -55,6 +42,7 @@ _APART = 0.02  # rad, from which two arrows are seen as two
 _UPRIGHT = 1e-9  # sine of the tilt, below which a pole has no node
 _SPARSE = 1.0  # rad of an orbit from one row to the next, from which a source can't be followed
 EYE = "eye"
+_STRETCH = 25.0  # of a frame along the line of sight: perspective is a 25th of what it was
 _LIFT = 1.012  # of the point under the source, in radii
 _MARK = 0.03  # radius of the ring about longitude and latitude zero
 
@@ -80,57 +68,46 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     if beside and averaged:
         subject = pointed(dataset, subject, figure, plane=True)
     subject = replace(subject, meshes=[mesh.moved(_turn(west), np.zeros(3))], reach=float(axes.max()))
-    stage = replace(subject.stage([], [], name.capitalize() or "Planet"), axis_length=0.0)
-    lines = _lines(half, figure, west, prime=turns or subject.attitude is None)
-    stage.lines.extend(lines)
+    marks = _marks(half, figure, west, prime=turns or subject.attitude is None)
     zero = f"{west:.4g}° west of Greenwich" if west else "at longitude zero"
     notes = [f"continents: Natural Earth; the body's x axis is {zero}"] if name == "earth" else []
-    face = facing(dataset, subject, figure)
-    faces = []
+    face = facing(dataset, subject, figure, marks)
     if face is not None:
-        faces = [replace(face[0], lines=[*lines, *face[0].lines])]
         notes.append(face[1])
+    faces = [] if face is None else [face[0]]
+    title = name.capitalize() or "Planet"
     called = {"": "a planet", "earth": "the Earth", "moon": "the Moon"}.get(name, name.capitalize())
     if subject.attitude is None:
-        _in_its_own_axes(dataset, stage, figure, notes)
-        stage = replace(stage, camera=eye_of_pole(0.3, 1.75))
+        shown = [*_in_its_own_axes(dataset, figure, notes), *marks]
+        stage = subject.stage(shown, title, axes=0.0, camera=eye_of_pole(0.3, 1.75))
         return Picture(f"rotation of {called}", [*faces, stage], notes)
     pole = subject.attitude @ figure
-    arrow = Arrow("figure_axis", "figure axis", parts.FIGURE, POLE_REACH * pole, False, "figure axis")
-    stage.arrows.append(arrow)
-    stage = on_reference_plane(dataset, stage)
-    circle_of_precession(dataset, stage, pole, "figure", notes)
+    shown = [arrow("figure_axis", "figure axis", parts.FIGURE, POLE_REACH * pole, "figure axis"), *marks]
     if turns:
-        stage = _with_balls(stage, source_arrows(dataset, SOURCE_REACH))
-    elif beside:
-        notes.append("the plane of reference moves in space: the globe is drawn as seen from it")
+        sources_there = source_arrows(dataset, SOURCE_REACH, balls=True)
     else:
-        stage.arrows.extend(followed_sources(dataset, notes))
+        sources_there = [] if beside else followed_sources(dataset, notes)
+    plane, place = reference_plane(dataset)
+    shown += [*sources_there, *plane, *circle_of_precession(dataset, pole, "figure", place, notes)]
+    if not turns and beside:
+        notes.append("the plane of reference moves in space: the globe is drawn as seen from it")
     if not turns:
         notes.append(standing_note(dataset, "globe"))
     elif signals.aliased(dataset):
         notes.append("samples are half a turn apart or more: the globe's turning isn't seen")
-    stage = replace(stage, camera=eye_of_pole())
+    stage = subject.stage(shown, title, axes=0.0, camera=eye_of_pole(), looked_from=place)
     return Picture(f"rotation of {called} in space", [*faces, stage], notes)
 
 
-def _with_balls(stage: Stage, arrows: list[Arrow]) -> Stage:
-    """The stage with arrows to sources, which are small balls at the tips, the Sun larger; not to scale."""
-    balls = [replace(one, ball=_SUN if one.label.endswith("Sun") else _MOON, label_at=1.05) for one in arrows]
-    return replace(stage, arrows=[*stage.arrows, *balls])
-
-
-def _lines(half: Array, figure: Array, west: float, *, prime: bool) -> list[Line]:
+def _marks(half: Array, figure: Array, west: float, *, prime: bool) -> list[Part]:
     """Meridians and parallels, the equator, and the prime meridian, which makes the rotation seen."""
-    turn = _turn(west)
-    lines = [
-        Line(f"graticule/{k}", (20, 24, 30), line @ turn.T, BODY, 0.8, 0.55)
-        for k, line in enumerate(graticule(half))
-    ]
+    turn = _turn(west).T
+    rings = [line @ turn for line in graticule(half)]
+    found = [lines("graticule/0", (20, 24, 30), rings, place=BODY, width=0.8, strength=0.55)]
     if prime:
-        line = graticule(half, 180.0, 1.006)[0] @ turn.T
-        lines.append(Line("prime_meridian", parts.PALE, line, BODY, 1.6, 1.0, "prime meridian"))
-    return [*lines, Line("equator", EQUATOR, parts.circle(1.01, figure), BODY, 1.8, 1.0, "equator")]
+        first = graticule(half, 180.0, 1.006)[0] @ turn
+        found.append(lines("prime_meridian", parts.PALE, [first], "prime meridian", place=BODY, width=1.6))
+    return [*found, lines("equator", EQUATOR, [parts.circle(1.01, figure)], "equator", place=BODY, width=1.8)]
 
 
 def _turn(degrees: float) -> Array:
@@ -158,30 +135,32 @@ def _semi_axes(subject: Subject) -> Array | None:
     return np.asarray(axes)
 
 
-def _in_its_own_axes(dataset: xarray.Dataset, stage: Stage, figure: Array, notes: list[str]) -> None:
-    """Draw figure axis and spin axis, their angle enlarged until it is visible."""
+def _in_its_own_axes(dataset: xarray.Dataset, figure: Array, notes: list[str]) -> list[Part]:
+    """Figure axis and spin axis, their angle enlarged until it is visible."""
     notes.append("no attitude was recorded: the body is shown in its own axes and doesn't turn")
-    stage.vectors.append(
-        Vector("figure_axis", "figure axis", parts.FIGURE, figure, 0.55 * figure, BODY, "figure axis", 0.014)
+    words = "figure axis"
+    fixed = parts.fixed_arrow(
+        "figure_axis", words, parts.FIGURE, figure, 0.55 * figure, words, place=BODY, radius=0.014
     )
     rates = signals.values(dataset, "angular_velocity", 3)
     if rates is None:
-        return
+        return fixed
     spin = rates / np.linalg.norm(rates, axis=1, keepdims=True)
     spin = spin * np.sign(spin @ figure)[:, None]
     apart = spin - np.outer(spin @ figure, figure)
     size = float(np.nanmax(np.linalg.norm(apart, axis=1)))
     if not size > 0:
-        return
+        return fixed
     factor = max(float(f"{0.32 / size:.0e}"), 1.0)
     shown = 1.4 * figure + 1.4 * factor * apart
     times = f"{factor:,.0f} times"
     words = "spin axis" if factor == 1.0 else f"spin axis, {times} farther from the figure axis"
-    stage.arrows.append(Arrow("spin_axis", "spin axis", parts.VELOCITY, shown, True, words))
-    stage.trails.append(
-        Trail("polar_motion", parts.POLHODE, shown, in_body=True, words="path of the spin axis")
-    )
     notes.append(f"the angle between spin axis and figure axis is drawn {times} too large")
+    return [
+        arrow("spin_axis", "spin axis", parts.VELOCITY, shown, words, place=BODY),
+        *fixed,
+        *trail("polar_motion", parts.POLHODE, shown, "path of the spin axis", place=BODY),
+    ]
 
 
 def axes_picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
@@ -199,25 +178,25 @@ def axes_picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
         del axes["momentum"]
     notes: list[str] = []
     subject = pointed(dataset, subject, scene_of(dataset).figure)
-    stage = replace(subject.stage([], [], "Axes in space"), axis_length=0.0, camera=eye_of_pole())
+    shown: list[Part] = []
     if leading == "figure":
         notes.append(standing_note(dataset, "body"))
     else:
-        stage = replace(stage, meshes=[], points=np.empty((0, 3)))
-        rings = enumerate(graticule(np.full(3, 0.6), lift=1.0))
-        stage.lines.extend(Line(f"directions/{k}", parts.FAINT, line, SPACE, 0.7, 0.4) for k, line in rings)
+        subject = replace(subject, meshes=[], points=np.empty((0, 3)))
+        rings = graticule(np.full(3, 0.6), lift=1.0)
+        shown.append(lines("directions/0", parts.FAINT, rings, width=0.7, strength=0.4))
         notes.append("the body isn't drawn: of its attitude only the momentum's direction is known")
     for name, axis in axes.items():
         color = parts.FIGURE if name == "figure" else parts.MOMENTUM
-        shown, words = POLE_REACH * axis, f"{name} axis"
-        stage.arrows.append(Arrow(f"{name}_axis", words, color, shown, False, words))
-        path = parts.Trail(f"{name}_path", color, shown, words=f"path of the {words}")
+        tip, words = POLE_REACH * axis, f"{name} axis"
+        shown.append(arrow(f"{name}_axis", words, color, tip, words))
         # of samples too far apart it would be a cloud; on the circle of precession it wouldn't be seen
-        if path.line and np.ptp(axis[:, 2]) > _APART:
-            stage.trails.append(path)
-    stage = on_reference_plane(dataset, stage)
-    circle_of_precession(dataset, stage, axes[leading], leading, notes)
-    stage.arrows.extend(followed_sources(dataset, notes))
+        if signals.joined(tip, parts.NEAR) and np.ptp(axis[:, 2]) > _APART:
+            shown += trail(f"{name}_path", color, tip, f"path of the {words}")
+    plane, place = reference_plane(dataset)
+    shown += [*plane, *circle_of_precession(dataset, axes[leading], leading, place, notes)]
+    shown += followed_sources(dataset, notes)
+    stage = subject.stage(shown, "Axes in space", axes=0.0, camera=eye_of_pole(), looked_from=place)
     return Picture("axes in space", [stage], notes)
 
 
@@ -278,51 +257,53 @@ def standing_note(dataset: xarray.Dataset, what: str) -> str:
     return f"{why}: the {what} points where its figure axis does, and doesn't turn about it"
 
 
-def followed_sources(dataset: xarray.Dataset, notes: list[str]) -> list[Arrow]:
+def followed_sources(dataset: xarray.Dataset, notes: list[str]) -> list[Part]:
     """Directions of sources that advance little enough from row to row for the eye to follow."""
     seconds = signals.seconds(dataset)
     step = float(np.abs(np.diff(seconds)).mean()) if len(seconds) > 1 else 0.0
     orbits = [one.get("orbit", {}) for one in scene_of(dataset).sources]
     rates = {f"source{k}": float(orbit.get("mean_motion", 0.0)) for k, orbit in enumerate(orbits)}
     kept = []
-    for arrow in source_arrows(dataset, SOURCE_REACH):
-        if abs(rates.get(arrow.name, 0.0)) * step > _SPARSE:
-            notes.append(f"the {arrow.words} isn't shown: samples are too far apart to follow it")
+    for shown in source_arrows(dataset, SOURCE_REACH):
+        if abs(rates.get(shown.path.rpartition("/")[2], 0.0)) * step > _SPARSE:
+            notes.append(f"the {shown.words} isn't shown: samples are too far apart to follow it")
         else:
-            kept.append(arrow)
+            kept.append(shown)
     return kept
 
 
-def on_reference_plane(dataset: xarray.Dataset, stage: Stage) -> Stage:
-    """The stage with the plane of reference and its normal, from which it is looked at."""
+def reference_plane(dataset: xarray.Dataset) -> tuple[list[Part], str]:
+    """The plane of reference and its normal, and the frame that they are in, from which it is looked at."""
     axes, words = signals.reference_axes(dataset) or (np.eye(3), "plane of reference")
+    place, turning = "", []
     if not np.array_equal(axes, np.eye(3)):
-        turn = parts.viewer_quaternion(quaternion_of(axes.T[None]))
-        turns = np.repeat(turn, dataset.sizes["time"], axis=0)
-        stage = replace(stage, frames={**stage.frames, PLANE: turns}, looked_from=PLANE)
-    place, up = stage.looked_from, np.array([0.0, 0.0, 1.0])
-    rim = Line("ecliptic/rim", ECLIPTIC, parts.circle(1.75, up), place, 1.8, 0.9, words)
-    stage.lines.extend([rim, Line("ecliptic/inner", ECLIPTIC, parts.circle(1.3, up), place, 0.8, 0.35)])
-    for k in range(6):
-        ends = np.outer([-1.75, 1.75], direction_of(0.0, np.pi * k / 6))
-        stage.lines.append(Line(f"ecliptic/spoke{k}", ECLIPTIC, ends, place, 0.7, 0.22))
-    stage.lines.append(Line("normal", parts.FAINT, np.array([[0, 0, -1.5], [0, 0, 1.75]]), place, 1.0))
-    stage.spots.append(Spot("normal", "normal", parts.FAINT, np.array([0.0, 0.0, 1.78]), place))
-    return stage
+        place, turn = PLANE, parts.viewer_quaternion(quaternion_of(axes.T[None]))
+        turning = parts.frame(PLANE, quaternion=np.repeat(turn, dataset.sizes["time"], axis=0))
+    up, upright = np.array([0.0, 0.0, 1.0]), np.array([[0, 0, -1.5], [0, 0, 1.75]])
+    spokes = [np.outer([-1.75, 1.75], direction_of(0.0, np.pi * k / 6)) for k in range(6)]
+    rim, inner = parts.circle(1.75, up), parts.circle(1.3, up)
+    return [
+        *turning,
+        lines("ecliptic/rim", ECLIPTIC, [rim], words, place=place, width=1.8, strength=0.9),
+        lines("ecliptic/inner", ECLIPTIC, [inner], place=place, width=0.8, strength=0.35),
+        lines("ecliptic/spoke0", ECLIPTIC, spokes, place=place, width=0.7, strength=0.22),
+        lines("normal", parts.FAINT, [upright], place=place, width=1.0),
+        parts.spot("normal/label", "normal", parts.FAINT, 1.78 * up, place),
+    ], place
 
 
 def circle_of_precession(
-    dataset: xarray.Dataset, stage: Stage, pole: Array, axis: str, notes: list[str]
-) -> None:
-    """Put on a stage the circle, with its period, that a pole (rows, 3), space axes, of the axis named figure
-    or momentum describes about the normal, if it does.
+    dataset: xarray.Dataset, pole: Array, axis: str, place: str, notes: list[str]
+) -> list[Part]:
+    """The circle, with its period, that a pole (rows, 3), space axes, of the axis named figure or momentum
+    describes about the normal of the plane of reference, if it does, in the frame of this plane.
     """
-    if stage.looked_from == PLANE:
-        frame = signals.reference_axes(dataset)
-        pole = pole if frame is None else pole @ frame[0].T
+    frame = signals.reference_axes(dataset)
+    if place == PLANE and frame is not None:
+        pole = pole @ frame[0].T
     tilt = float(np.nanmean(np.arctan2(np.hypot(pole[:, 0], pole[:, 1]), pole[:, 2])))
     if not 1e-3 < tilt < np.pi - 1e-3:
-        return
+        return []
     up, high = np.array([0.0, 0.0, 1.0]), np.array([0, 0, POLE_REACH * np.cos(tilt)])
     ring = parts.circle(POLE_REACH * np.sin(tilt), up, high)
     words = "precession of the pole" if axis == "figure" else f"precession of the {axis}"
@@ -332,12 +313,12 @@ def circle_of_precession(
         mean, span = secular(seconds, found[1]), abs(float(seconds[-1] - seconds[0]))
         advance = abs(mean.rate) * span
         if float(np.abs(found[1] - mean.at(seconds)).max()) > max(advance, 1e-6):
-            return  # it strays as far as it advances: it goes about another pole
+            return []  # it strays as far as it advances: it goes about another pole
         if advance > 1e-9 and _whole_revolution(dataset, span):
             words += f": once in {mean.about}{span_text(2 * np.pi / abs(mean.rate), 3)}"
             which = "pole" if axis == "figure" else axis
             notes.append(f"the {which}'s longitude moves by {mean.about}{mean.rate:.6g} rad/s on the mean")
-    stage.lines.append(Line("precession", PRECESSION, ring, stage.looked_from, 2.0, 1.0, words))
+    return [lines("precession", PRECESSION, [ring], words, place=place, width=2.0)]
 
 
 def _whole_revolution(dataset: xarray.Dataset, span: float) -> bool:
@@ -351,54 +332,38 @@ def _whole_revolution(dataset: xarray.Dataset, span: float) -> bool:
     return True
 
 
-def facing(dataset: xarray.Dataset, subject: Subject, figure: Array) -> tuple[Stage, str] | None:
+def facing(
+    dataset: xarray.Dataset, subject: Subject, figure: Array, marks: list[Part]
+) -> tuple[Stage, str] | None:
     """Stage and note of a globe that faces its strongest source at the end of the run; None for others."""
     found = sources.seen(dataset)
     if found is None or not np.isfinite(found.directions).all() or not found.stays(found.last):
         return None
-    source = called(found.body, found.name)
-    point = f"sub-{found.body.name if found.body else 'source'} point"
-    loop = loop_rows(found.coordinates(figure)[:, 1])
-    stage = _stage(subject, found.directions, figure, source, point, loop)
-    seen_as = f"seen from the direction of {source}, from far away, the mean figure axis upwards"
-    note = f"{stage.title}: {seen_as}; nothing is exaggerated"
-    if subject.attitude is None:
-        note += "; no attitude was recorded, so that the figure axis stays upright"
-    return stage, note
-
-
-def _stage(
-    subject: Subject, directions: Array, figure: Array, source: str, point: str, lasting: int
-) -> Stage:
-    attitude = subject.attitude
+    source, attitude, directions = called(found.body, found.name), subject.attitude, found.directions
     toward = directions if attitude is None else np.einsum("tij,tj->ti", attitude, directions)
     up = figure if attitude is None else np.nanmean(attitude @ figure, axis=0)
     north = up - (toward @ up)[:, None] * toward
     north /= np.linalg.norm(north, axis=1, keepdims=True)
-    frame = np.stack([toward, np.cross(north, toward), north], axis=2)
-    track = Trail(
-        "sub_source", parts.SOURCE, _LIFT * directions, in_body=True, words=point, head=True, lasting=lasting
-    )
-    upright = np.array([[0.0, 0.0, 1.03], [0.0, 0.0, 1.13]])
-    limb = parts.circle(1.0, np.array([1.0, 0.0, 0.0]))
+    turned = quaternion_of(np.stack([toward, np.cross(north, toward), north], axis=2))
+    stretched = np.tile([_STRETCH, 1.0, 1.0], (len(toward), 1))
+    point = f"sub-{found.body.name if found.body else 'source'} point"
+    lasting = loop_rows(found.coordinates(figure)[:, 1])
+    above, zero = _LIFT * directions, np.eye(3)[(int(np.abs(figure).argmax()) + 1) % 3]
+    x, _, z = np.eye(3)
     words = "longitude and latitude zero"
-    zero = np.eye(3)[(int(np.abs(figure).argmax()) + 1) % 3]
-    stage = subject.stage([], [track], f"Seen from {source}")
-    return replace(
-        stage,
-        root="face",
-        turns_with="scene" if stage.quaternion is not None else "",
-        axis_length=0.0,
-        lines=[
-            Line("limb", parts.FAINT, limb, EYE, 1.4, 0.8),
-            Line("upright", parts.FAINT, upright, EYE, 2.0),
-            Line("zero", parts.PALE, parts.circle(_MARK, zero, _LIFT * zero), BODY, 2.0, 1.0, words),
-        ],
-        spots=[
-            Spot("north", "mean north", parts.FAINT, np.array([0.0, 0.0, 1.22]), EYE),
-        ],
-        frames={EYE: parts.viewer_quaternion(quaternion_of(frame))},
-        looked_from=EYE,
-        flat=True,
-        camera=Camera(np.array([1.3 / np.tan(FIELD / 2), 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 1.0])),
-    )
+    shown = [
+        *parts.frame(EYE, quaternion=parts.viewer_quaternion(turned), scale=stretched),
+        *trail("sub_source", parts.SOURCE, above, point, place=BODY, head=True, lasting=lasting),
+        *marks,
+        lines("limb", parts.FAINT, [parts.circle(1.0, x)], place=EYE, width=1.4, strength=0.8),
+        lines("upright", parts.FAINT, [np.outer([1.03, 1.13], z)], place=EYE, width=2.0),
+        lines("zero", parts.PALE, [parts.circle(_MARK, zero, _LIFT * zero)], words, place=BODY, width=2.0),
+        parts.spot("north", "mean north", parts.FAINT, 1.22 * z, EYE),
+    ]
+    camera, title = Camera(1.3 / np.tan(FIELD / 2) * x, np.zeros(3), z), f"Seen from {source}"
+    stage = subject.stage(shown, title, root="face", axes=0.0, camera=camera, looked_from=EYE, flat=True)
+    seen_as = f"seen from the direction of {source}, from far away, the mean figure axis upwards"
+    note = f"{title}: {seen_as}; nothing is exaggerated"
+    if attitude is None:
+        note += "; no attitude was recorded, so that the figure axis stays upright"
+    return stage, note

@@ -10,7 +10,7 @@ from rigidsim.look.record import scene_of
 from rigidsim.look.solids import Mesh, spinning_top
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import FIELD, Subject, vectors_of
-from rigidsim.look.stages.parts import BODY, SPACE, Array, Camera, Line, Picture, Spot, Trail, Vector
+from rigidsim.look.stages.parts import BODY, Array, Camera, Picture, lines, spot, trail
 
 TRACE = 1.0  # where on the axis the traced point is, in reaches
 _SYMMETRIC = 1e-9  # of the moments
@@ -27,7 +27,7 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     if symbol is not None:
         mesh, reach = symbol
         subject = replace(subject, meshes=[mesh.scaled(1 / reach)], points=np.zeros((0, 3)), reach=reach)
-    arrows, _, notes = vectors_of(dataset, subject, paths=False)
+    shown, notes = vectors_of(dataset, subject, paths=False, longer=(1.25, 1.1))
     if symbol is not None:
         notes.append(
             "the config gives moments and no shape: the body is drawn as a top with its axis, its centre of "
@@ -35,39 +35,35 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
         )
     attitude = subject.attitude
     assert attitude is not None
-    arrows = [replace(a, vectors=a.vectors * (1.25 if a.name == "angular_momentum" else 1.1)) for a in arrows]
     tip = TRACE * attitude @ axis
-    trails = [Trail("tip", parts.FIGURE, tip, words="trace of the axis", head=True)]
     lowest = min(float(np.nanmin(tip @ up)), float((subject.meshes[0].vertices @ axis).min()))
     # A top that dips below its pivot stands on a post, not on a floor that it would pass through.
     post = not (lowest > -0.02 and float(np.nanmin(tip @ up)) > 0.25)
     ground, center = (-1.35 if post else 0.0) * up, np.zeros(3)
     across = _across(up)
-    lines = [
-        Line("ground/rim", parts.FAINT, parts.circle(1.6, up, ground), SPACE, 1.2, 0.8),
-        *parts.grid("ground", ground, *across, 1.6, 4, 0.4, round_=True),
-        Line("vertical", parts.FAINT, np.stack([ground, 1.5 * up]), width=1.0, words="vertical"),
-    ]
+    rim, upright = parts.circle(1.6, up, ground), np.stack([ground, 1.5 * up])
+    place, words = 1.25 * across[0] + 0.9 * up, "gravity"
     # on a post the label is below, where it is clear of the body's own
-    spots = [Spot("pivot", "pivot", parts.PALE, 0.55 * ground if post else center, size=0.0 if post else 5.0)]
+    pivot, size = (0.55 * ground, 0.0) if post else (center, 5.0)
+    shown += [
+        *parts.fixed_arrow(words, words, parts.PULL, place, -0.55 * up, words, radius=0.02),
+        *trail("tip", parts.FIGURE, tip, "trace of the axis", head=True),
+        lines("ground/rim", parts.FAINT, [rim], strength=0.8),
+        parts.grid("ground", ground, *across, 1.6, 4, 0.4, round_=True),
+        lines("vertical", parts.FAINT, [upright], "vertical", width=1.0),
+        spot("pivot", "pivot", parts.PALE, pivot, size=size),
+    ]
     if post:
-        lines.append(Line("ground/post", parts.PALE, np.stack([ground, center]), width=4.0))
+        shown.append(lines("ground/post", parts.PALE, [np.stack([ground, center])], width=4.0))
     if symbol is None:
         com = arm / subject.reach
-        lines.append(Line("arm", parts.PALE, np.stack([center, com]), BODY, 2.5))
-        spots.append(Spot("center_of_mass", "centre of mass", parts.PULL, com, BODY, 6.0))
-    place, words = 1.25 * across[0] + 0.9 * up, "gravity"
+        shown.append(lines("arm", parts.PALE, [np.stack([center, com])], place=BODY, width=2.5))
+        shown.append(spot("center_of_mass", "centre of mass", parts.PULL, com, BODY, 6.0))
     elevation = np.deg2rad(20.0)
     direction = np.cos(elevation) * (0.55 * across[0] - 0.83 * across[1]) + np.sin(elevation) * up
     target, radius = (-0.1 if post else 0.55) * up, 2.05 if post else 1.62
-    stage = replace(
-        subject.stage(arrows, trails, "Top on its pivot"),
-        lines=lines,
-        spots=spots,
-        vectors=[Vector("gravity", words, parts.PULL, place, -0.55 * up, SPACE, words, 0.02)],
-        camera=Camera(target + radius / np.sin(FIELD / 2) * direction, target, up),
-    )
-    return Picture("top on a fixed point", [stage], notes)
+    camera = Camera(target + radius / np.sin(FIELD / 2) * direction, target, up)
+    return Picture("top on a fixed point", [subject.stage(shown, "Top on its pivot", camera=camera)], notes)
 
 
 def _figure(dataset: xarray.Dataset, arm: Array) -> Array:

@@ -7,9 +7,11 @@ narrow or too wide to be seen is drawn with its angles multiplied by one factor 
 the legend states.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import rerun as rr
 import xarray
 
 from rigidsim.look import signals
@@ -17,7 +19,7 @@ from rigidsim.look.curves import plotted
 from rigidsim.look.record import scene_of
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import Subject
-from rigidsim.look.stages.parts import Array, Cone, Picture, Stage
+from rigidsim.look.stages.parts import BODY, Array, Columns, Part, Picture, Rows
 
 COVARIANCE = "attitude_covariance"
 """Variable (time, 3, 3) of a dataset, rad^2, of the attitude as a rotation vector in space axes."""
@@ -29,7 +31,10 @@ _ROUNDING = 1e-7  # of the uncertainty about the axis: the root of what rounding
 _NARROW, _WIDE = np.deg2rad(12.0), np.deg2rad(60.0)  # half-angles (rad) that are drawn as they are
 _SHOWN = np.deg2rad(50.0)  # the largest (rad) that others are drawn with
 _TO_SCALE = 0.5  # reaches: a body drawn smaller is a mark on its orbit
+_CLEAR = 46  # of 255: of a cone, through which labels are read
 _LEADING = "figure_axis_uncertainty"
+CONE = f"{BODY}/{_LEADING}"
+"""Path of the cone on a stage."""
 
 
 @dataclass(frozen=True)
@@ -95,8 +100,7 @@ def with_cone(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Pi
     words = "1 sigma of the figure axis" + ("" if factor == 1 else f", drawn × {factor:g}")
     rim = np.nan_to_num(found.rim(factor))
     # the other side of a top's axis goes through the ground
-    cone = Cone(_LEADING, COLOR, _REACH * rim, words, double=not signals.is_top(dataset))
-    short = replace(cone, rim=_ON_DISC * rim)
+    sides = [rim] if signals.is_top(dataset) else [rim, -rim]
     notes = [
         f"{words} (white cone): the standard deviation that the fit predicts by the sigmas of its data and "
         "priors; the half-angles are the roots of the covariance across the axis, times that factor if there "
@@ -110,7 +114,9 @@ def with_cone(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Pi
     return replace(
         picture,
         stages=[
-            replace(one, cones=[short if one.flat else cone]) if _to_scale(one) else one
+            replace(one, parts=[*one.parts, *_cone(sides, _ON_DISC if one.flat else _REACH, words)])
+            if one.size > _TO_SCALE
+            else one
             for one in picture.stages
         ],
         notes=[*picture.notes, *notes],
@@ -123,7 +129,29 @@ def drawn_factor(largest: float) -> float:
     return 1.0 if _NARROW <= largest <= _WIDE else float(10.0 ** np.floor(np.log10(_SHOWN / largest)))
 
 
-def _to_scale(stage: Stage) -> bool:
-    """Whether a body that turns is drawn at its own size on a stage."""
-    turns = stage.quaternion is not None or bool(stage.turns_with)
-    return turns and max((mesh.reach() for mesh in stage.meshes), default=0.0) > _TO_SCALE
+def _cone(rims: Sequence[Array], reach: float, words: str) -> list[Part]:
+    """Translucent cones of some length along time, from the reference point to the corners (rows, corners, 3)
+    of their rims, unit vectors in body axes.
+    """
+    corners = np.stack(rims, axis=1) * reach  # (rows, sides, corners, 3)
+    _, sides, count, _ = corners.shape
+    numbers = 1 + np.arange(sides * count, dtype=np.uint32).reshape(sides, count)  # 0 is the apex
+    triangles = np.stack([np.zeros_like(numbers), numbers, np.roll(numbers, -1, axis=1)], axis=2)
+
+    def surface(rows: Rows) -> Columns:
+        shown = corners[rows].astype(np.float32).reshape(-1, sides * count, 3)
+        vertices = np.concatenate([np.zeros_like(shown[:, :1]), shown], axis=1)
+        columns = rr.Mesh3D.columns(vertex_positions=vertices.reshape(-1, 3))
+        return columns.partition([vertices.shape[1]] * len(vertices))
+
+    def edge(rows: Rows) -> Columns:
+        shown = corners[rows].astype(np.float32)
+        closed = np.concatenate([shown, shown[:, :, :1]], axis=2).reshape(-1, count + 1, 3)
+        return rr.LineStrips3D.columns(strips=list(closed)).partition([sides] * len(shown))
+
+    clear = rr.Mesh3D.from_fields(triangle_indices=triangles.reshape(-1, 3), albedo_factor=(*COLOR, _CLEAR))
+    rim = rr.LineStrips3D.from_fields(colors=[COLOR], radii=parts.points_wide(0.9))
+    return [
+        Part(f"{CONE}/surface", [clear], surface, corners[:, 0], words, COLOR),
+        Part(f"{CONE}/rim", [rim], edge),
+    ]

@@ -19,7 +19,7 @@ from rigidsim.look.solids import Mesh, solid_mesh
 from rigidsim.look.sources import integrated
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import Subject
-from rigidsim.look.stages.parts import BODY, Array, Arrow, Color, Line, Picture, Solid, Spot, Stage, Trail
+from rigidsim.look.stages.parts import BODY, Array, Color, Picture, Stage, arrow, lines, trail
 
 OF_BODY: Color = (235, 140, 80)
 OF_WHEELS: Color = (150, 205, 110)
@@ -40,7 +40,7 @@ def with_wheels(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> 
     missing = [one["name"] for one in scene_of(dataset).rotors if one["name"] not in drawn]
     if missing:
         picture.notes.append(f"not drawn, since rotor_rate isn't recorded: rotor {', '.join(missing)}")
-    to_scale = [stage for stage in picture.stages if stage.unit == subject.reach and stage.meshes]
+    to_scale = [stage for stage in picture.stages if stage.unit == subject.reach and stage.size]
     if not found or not to_scale:
         return picture
     stage, inertia = to_scale[0], gyrostats.tensor(dataset)
@@ -55,16 +55,17 @@ def with_wheels(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> 
         radius, key = max(share * across, _SMALLEST), tuple(np.round(rotor.axis, 3).tolist())
         middle = tops.get(key, float(along.max())) + _GAP + radius * _FLATNESS / 2
         tops[key] = middle + radius * _FLATNESS / 2
-        stage.frames[f"{BODY}/{name}"] = parts.viewer_quaternion(_turning(dataset, rotor, slower))
         mesh = _mesh(radius).moved(
             np.column_stack([*signals.across(rotor.axis), rotor.axis]), middle * rotor.axis
         )
-        stage.solids.append(Solid("disc", mesh, f"{BODY}/{name}"))
         beside = middle * rotor.axis + 1.2 * radius * signals.across(rotor.axis)[0]
-        stage.spots.append(Spot(f"{name}/label", rotor.name, _MARK, beside, BODY))
         words = f"rotor {rotor.name}" + (f", drawn turning {slower:g} times slower" if slower > 1 else "")
-        ends = np.outer([0.0, tops[key]], rotor.axis)
-        stage.lines.append(Line(f"{name}/axle", _MARK, ends, BODY, 2.0, 0.7, words))
+        axle, place = np.outer([0.0, tops[key]], rotor.axis), f"{BODY}/{name}"
+        turning = parts.viewer_quaternion(_turning(dataset, rotor, slower))
+        stage.parts.extend(parts.frame(place, quaternion=turning))
+        stage.parts.append(parts.solid(parts.around(place, "disc"), mesh))
+        stage.parts.append(parts.spot(f"{name}/label", rotor.name, _MARK, beside, BODY))
+        stage.parts.append(lines(f"{name}/axle", _MARK, [axle], words, place=BODY, width=2.0, strength=0.7))
     _momenta(dataset, stage, found, picture.notes)
     return picture
 
@@ -104,7 +105,7 @@ def _mesh(radius: float) -> Mesh:
 def _momenta(dataset: xarray.Dataset, stage: Stage, found: list[RecordedRotor], notes: list[str]) -> None:
     """Put the body's and the rotors' shares of the momentum, and its path, on a stage that has the whole."""
     whole = gyrostats.momentum(dataset)
-    if whole is None or all(arrow.name != "angular_momentum" for arrow in stage.arrows):
+    if whole is None or all(part.path != "centre/angular_momentum" for part in stage.parts):
         return
     inner = np.asarray(sum(rotor.inner for rotor in found))
     factor = parts.ARROW_REACH / parts.longest(whole)
@@ -112,11 +113,10 @@ def _momenta(dataset: xarray.Dataset, stage: Stage, found: list[RecordedRotor], 
     moving = "L's path in the body"
     shares = ((whole - inner, "body", OF_BODY, of_body, 0.8), (inner, "rotor", OF_WHEELS, of_wheels, 1.0))
     for vectors, name, color, words, at in shares:
-        label = "rotors" if name == "rotor" else name
-        arrow = Arrow(f"{name}_momentum", label, color, vectors * factor, True, words, at, 0.018)
-        stage.arrows.append(arrow)
-    path = Trail("momentum_path", parts.POLHODE, whole * factor, in_body=True, words=moving)
-    stage.trails.append(path)
+        label, shown = "rotors" if name == "rotor" else name, vectors * factor
+        more = {"place": BODY, "label_at": at, "radius": 0.018}
+        stage.parts.append(arrow(f"{name}_momentum", label, color, shown, words, **more))
+    stage.parts.extend(trail("momentum_path", parts.POLHODE, whole * factor, moving, place=BODY))
     notes += [
         f"{of_body} (orange), and {of_wheels} (green): to the scale of L, which they add up to",
         f"{moving} (pink): on a sphere, if no torque from outside changes L",

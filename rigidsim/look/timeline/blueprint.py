@@ -9,11 +9,9 @@ from rerun.blueprint.components import LinkAxis
 
 from rigidsim.look.paths import Path
 from rigidsim.look.plots import Plot
-from rigidsim.look.stages.bodies import camera
 from rigidsim.look.stages.parts import Color, Stage
 from rigidsim.look.timeline import entities
 from rigidsim.look.timeline.drawn import Clock, DrawnRun
-from rigidsim.look.timeline.entities import trail_path
 
 TRAIL_ROWS = 450  # at most in the bright end of a trail, and never more than a tenth of the run
 PIXELS = 800.0  # about the height of the page
@@ -136,7 +134,7 @@ def page_of(
 
 def left_side(
     scene: rrb.View | rrb.Container,
-    legend: Sequence[tuple[str, Color]],
+    legend: Mapping[str, Color],
     pages: Mapping[str, str],
     pixels: float = PIXELS,
 ) -> rrb.Container:
@@ -179,12 +177,16 @@ def time_panel(clock: Clock, screen: float, *, following: bool) -> rrb.TimePanel
 
 def space_view(stage: Stage, run: DrawnRun, *, narrow: bool, titled: bool = True) -> rrb.Spatial3DView:
     """A view of one stage of a run."""
-    eye = camera(stage, narrow=narrow, subject=run.subject)
+    eye = stage.camera
+    assert eye is not None
+    # further back in a narrow view, about as wide as high
+    position = eye.target + (1.08 if narrow else 1.0) * (eye.position - eye.target)
     rows = max(min(TRAIL_ROWS, len(run.steps) // 10), 2)
-    overrides: dict[Any, Any] = {}
-    for trail in stage.trails:
-        path = trail_path(stage, trail)
-        overrides[f"{path}/recent"] = rrb.VisibleTimeRanges(_window(run.clock, trail.lasting or rows))
+    overrides: dict[Any, Any] = {
+        f"/{stage.root}/{part.path}": rrb.VisibleTimeRanges(_window(run.clock, part.lasting or rows))
+        for part in stage.parts
+        if part.lasting is not None
+    }
     origin = f"/{stage.root}/{stage.looked_from}" if stage.looked_from else f"/{stage.root}"
     return rrb.Spatial3DView(
         origin=origin,
@@ -194,7 +196,7 @@ def space_view(stage: Stage, run: DrawnRun, *, narrow: bool, titled: bool = True
         background=_DARK,
         line_grid=rrb.LineGrid3D(visible=False),
         eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital, position=eye.position, look_target=eye.target, eye_up=eye.up
+            kind=rrb.Eye3DKind.Orbital, position=position, look_target=eye.target, eye_up=eye.up
         ),
         overrides=overrides,
     )
@@ -243,7 +245,7 @@ def plot_view(plots: Sequence[Plot], clock: Clock, *, named: bool = True) -> rrb
     corner = rrb.Corner2D.RightBottom if first.place == "drift" else rrb.Corner2D.LeftTop
     return rrb.TimeSeriesView(
         origin="/plots",
-        contents=[f"{entities.plot_path(plot)}/**" for plot in plots],
+        contents=[f"/{entities.plot_path(plot)}/**" for plot in plots],
         name=first.heading,
         plot_legend=rrb.PlotLegend(visible=named and lines > 1, corner=corner),
         axis_y=None if first.steady is None else rrb.ScalarAxis(range=first.steady),

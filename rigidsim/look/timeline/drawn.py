@@ -1,7 +1,7 @@
 """Everything drawn of one run, ready to be sent to a recording: clock, picture, plots, states and pages."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Self
@@ -17,8 +17,7 @@ from rigidsim.look.pages import config_page, leading, notes_page, summary_page
 from rigidsim.look.paths import PATHS, Path, sections
 from rigidsim.look.plots import Plot, drift_plot, other_plots
 from rigidsim.look.solids import Array
-from rigidsim.look.stages.bodies import Subject
-from rigidsim.look.stages.parts import Picture, Stage, screen_seconds
+from rigidsim.look.stages.parts import Part, Picture, Rows, Stage, screen_seconds
 from rigidsim.look.stages.registry import build_picture
 from rigidsim.look.states import States, charts_of, states_of
 from rigidsim.look.thinning import thin_with_extremes, thinned_indices
@@ -35,6 +34,7 @@ _UNIX_EPOCH = Fraction(4881175, 2)  # Julian date of 1970-01-01
 _DATED_NANOSECONDS = 8.5e18  # from 1970, 270 years: what the viewer's calendar surely holds
 _RESOLUTION = 1e-3  # of the smallest step: what a tick of the timeline may be at most
 MOST_LEADING = 3  # plots beside the scene
+CHUNK = 4096  # rows per chunk: larger ones make the viewer slow, smaller ones heavy
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,6 @@ class DrawnRun:
     rows: xarray.Dataset
     steps: NDArray[np.int64]
     picture: Picture
-    subject: Subject
     plots: list[Plot]
     paths: list[Path]
     states: list[States]
@@ -135,7 +134,7 @@ class DrawnRun:
         seconds = signals.seconds(rows)
         start, end = float(seconds[0]), float(seconds[-1])
         clock = dated(build_clock(seconds), epoch_of(rows.attrs))
-        picture, subject = build_picture(rows)
+        picture, _ = build_picture(rows)
         plots, paths = _about(rows, curves, picture)
         notes = list(picture.notes)
         if not clock.in_nanoseconds:
@@ -150,7 +149,6 @@ class DrawnRun:
             rows=rows,
             steps=thinned_indices(dataset.sizes["time"], most),
             picture=picture,
-            subject=subject,
             plots=plots,
             paths=[*paths, *sections(dataset)],
             states=[*states_of(dataset, start, end), *charts_of(rows)],
@@ -161,38 +159,57 @@ class DrawnRun:
             screen_seconds=screen_seconds(rows),
         )
 
-    def draw_static(self, recording: rr.RecordingStream, *, legend: Sequence[Stage] | None = None) -> None:
-        """Draw what holds for all times; with the clock and the legend of its own stages, or of those given,
-        but of none neither.
+    def entities(self, legend: Sequence[Stage] | None = None) -> list[tuple[str, Part]]:
+        """Everything that is drawn by its path; with the clock and the legend of its own stages, or of those
+        given, but of none neither.
         """
+        found = [
+            (f"/{stage.root}/{part.path}", part) for stage in self.picture.stages for part in stage.parts
+        ]
+        flat = [part for plot in self.plots for part in entities.plot_parts(plot)]
+        flat += [part for plane in self.paths for part in entities.plane_parts(plane)]
+        explained = self.picture.stages if legend is None else legend
+        if explained:
+            rows = thinned_indices(len(self.seconds), entities.CLOCK_ROWS)
+            words = [f"t = {text}" for text in self.words.coarse(self.seconds[rows].tolist())]
+            flat += entities.legend_parts(entities.legend_of(explained), words, rows)
+        return [*found, *((f"/{part.path}", part) for part in flat)]
+
+    def draw(
+        self,
+        recording: rr.RecordingStream,
+        first: int = 0,
+        *,
+        legend: Sequence[Stage] | None = None,
+        before: Callable[[int], None] = lambda rows: None,
+    ) -> None:
+        """Draw what holds for all times, and what changes from the first of the rows to be drawn on, in
+        chunks; before each the function gets the number of rows that are still to come.
+        """
+        shown = self.entities(legend)
         for name, text in self.pages.items():
             document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
             recording.log(f"/{name.lower()}", document, static=True)
-        entities.draw_static(recording, self.picture.stages)
-        entities.draw_plots(recording, self.plots, self._times(np.array([0, len(self.seconds) - 1])))
-        entities.draw_paths(recording, self.paths)
+        for stage in self.picture.stages:
+            recording.log(f"/{stage.root}", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        for path, part in shown:
+            if part.static:
+                recording.log(path, *part.static, static=True)
         for lane in self.states:
             ticks = np.rint(lane.seconds / self.clock.seconds_per_tick).astype(np.int64)
-            ticks += self.clock.since or 0
-            entities.draw_states(recording, lane, [self._clock_column(ticks)])
-        explained = self.picture.stages if legend is None else legend
-        if not explained:
-            return
-        rows = thinned_indices(len(self.seconds), entities.CLOCK_ROWS)
-        words = [f"t = {text}" for text in self.words.coarse(self.seconds[rows].tolist())]
-        entities.draw_legend(recording, entities.legend_of(explained), words, self._times(rows))
+            entities.draw_states(recording, lane, [self._clock_column(ticks + (self.clock.since or 0))])
+        count = len(self.seconds)
+        for start in range(first, count, CHUNK):
+            before(count - start)
+            rows = slice(start, min(start + CHUNK, count))
+            for path, part in shown:
+                if part.columns is not None:
+                    picked = part.picked(rows)
+                    if len(self.steps[picked]):
+                        columns = part.columns(picked)
+                        recording.send_columns(path, indexes=self._times(picked), columns=columns)
 
-    def draw_rows(self, recording: rr.RecordingStream, rows: slice) -> None:
-        """Draw what changes, for some rows."""
-        times = self._times(rows)
-        for stage in self.picture.stages:
-            for path, picked, columns in entities.stage_columns(stage, rows):
-                mine = times if picked == rows else self._times(picked)
-                recording.send_columns(path, indexes=mine, columns=columns)
-        entities.draw_plot_rows(recording, self.plots, times, rows)
-        entities.draw_path_rows(recording, self.paths, times, rows)
-
-    def _times(self, rows: slice | NDArray[np.int64]) -> list[rr.TimeColumn]:
+    def _times(self, rows: Rows) -> list[rr.TimeColumn]:
         return [self._clock_column(self.clock.ticks[rows]), rr.TimeColumn("step", sequence=self.steps[rows])]
 
     def _clock_column(self, ticks: NDArray[np.int64]) -> rr.TimeColumn:

@@ -19,6 +19,7 @@ from rigidsim.look.pages import legible
 from rigidsim.look.plots import HUES, PALETTE, Plot
 from rigidsim.look.signals import title_of, values
 from rigidsim.look.solids import Array, Color
+from rigidsim.look.stages.uncertainty import CONE
 from rigidsim.look.timeline.blueprint import PIXELS, build_blueprint, build_comparison
 from rigidsim.look.timeline.drawn import Clock, DrawnRun, build_clock, dated
 from rigidsim.scene.parts_of_values import in_time_order
@@ -26,7 +27,6 @@ from rigidsim.scene.readable import epoch_of
 from rigidsim.scene.row_rotations import angles_between, normalised
 
 LIVE_ROWS = 100_000
-CHUNK = 4096  # rows per chunk: larger ones make the viewer slow, smaller ones heavy
 _ROW_BYTES = 600  # at most: some twenty variables
 _FIRST_BYTES = 1024 * _ROW_BYTES  # bodies, layout, page
 MOST = 6  # largest number of runs shown side by side
@@ -63,16 +63,8 @@ def write_timeline(
     with recording_to(
         path, title_of(dataset), count, build_blueprint(run, part=part, height=height)
     ) as recording:
-        run.draw_static(recording)
-        for piece in chunks(0, count):
-            check_room(path, count - piece.start)
-            run.draw_rows(recording, piece)
+        run.draw(recording, before=lambda left: check_room(path, left))
     return count
-
-
-def chunks(first: int, count: int) -> Iterator[slice]:
-    """The rows from the first to the last, ``CHUNK`` at a time."""
-    return (slice(start, min(start + CHUNK, count)) for start in range(first, count, CHUNK))
 
 
 @contextmanager
@@ -129,10 +121,8 @@ class LiveRecording:
                 self._scales, self._last = scales, -1
                 self._stream.send_blueprint(build_blueprint(run, following=True))
                 self._stream.send_recording_name(legible(title_of(dataset)))
-            run.draw_static(self._stream)
             first = int(np.searchsorted(steps, self._last, side="right"))
-            for part in chunks(first, len(steps)):
-                run.draw_rows(self._stream, part)
+            run.draw(self._stream, first)
             self.rows += len(steps) - first
         self._last = int(steps[-1])
         self._stream.flush()
@@ -140,14 +130,14 @@ class LiveRecording:
 
 def _scales_of(run: DrawnRun) -> tuple[object, ...]:
     """What earlier rows were drawn with: equal for two parts of a run whose rows fit together."""
-    picture = run.picture
-    arrows = [(s.root, a.name, *np.round(a.vectors[0], 4)) for s in picture.stages for a in s.arrows]
-    trails = [(s.root, t.name, t.line, *np.round(t.points[0], 4)) for s in picture.stages for t in s.trails]
     plots = [(p.heading, p.place, len(p.labels)) for p in run.plots]
-    stages = [
-        (s.root, s.title, s.unit, len(s.lines), *(line.words for line in s.lines)) for s in picture.stages
+    stages = [(stage.title, stage.unit) for stage in run.picture.stages]
+    shown = [
+        (path, part.words, type(part.static[0]), *np.round(part.values[:1], 4).ravel())
+        for path, part in run.entities()
+        if part.static and (part.columns is not None or part.words)
     ]
-    return (run.clock.name, *stages, *arrows, *trails, *plots)
+    return (run.clock.name, *stages, *shown, *plots)
 
 
 @contextmanager
@@ -188,9 +178,7 @@ def write_comparison(
     count, name = sum(len(run.steps) for run in drawn), " and ".join(name for name, _ in named)
     with recording_to(path, name, count, blueprint) as recording:
         for run in drawn:
-            run.draw_static(recording, legend=stages if run is drawn[0] else ())
-            for part in chunks(0, len(run.seconds)):
-                run.draw_rows(recording, part)
+            run.draw(recording, legend=stages if run is drawn[0] else ())
     return count
 
 
@@ -204,15 +192,12 @@ def _part(clock: Clock, shown: Clock, seconds: Array) -> Clock:
 def _named(run: DrawnRun, name: str, number: int) -> DrawnRun:
     """A run under entities and titles of its own, with only its leading plots."""
     root, title = f"run{number}", legible(name)
-    stages = [
-        replace(
-            stage,
-            root=f"{root}/{stage.root}",
-            title=f"{title}: {stage.title}",
-            cones=[replace(cone, words=f"{title}: {cone.words}") for cone in stage.cones],
-        )
-        for stage in run.picture.stages[:1]
+    first = run.picture.stages[0]
+    drawn = [
+        replace(part, words=f"{title}: {part.words}") if part.words and part.path.startswith(CONE) else part
+        for part in first.parts
     ]
+    stage = replace(first, root=f"{root}/{first.root}", title=f"{title}: {first.title}", parts=drawn)
     plots = [
         replace(
             plot,
@@ -225,7 +210,7 @@ def _named(run: DrawnRun, name: str, number: int) -> DrawnRun:
         if plot.place != "more"
     ]
     pages = {f"{root}_{key}": text for key, text in run.pages.items() if key == "Summary"}
-    picture = replace(run.picture, stages=stages)
+    picture = replace(run.picture, stages=[stage])
     return replace(run, picture=picture, plots=plots, paths=[], states=[], pages=pages)
 
 
