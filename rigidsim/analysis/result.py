@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from operator import attrgetter
 from typing import Any
 
 import mpmath
@@ -229,71 +228,82 @@ def _number(value: Any) -> Any:
     return value.real if value.imag == 0 else [value.real, value.imag]
 
 
+_NUMBER, _WORDS, _FLAG = (np.float64, np.nan), (object, ""), (np.int8, 0)  # type, and what pads a table
+_OF_LINES = (
+    ("frequency", "frequency", "rad s-1", "angular frequency", _NUMBER),
+    ("frequency_error", "frequency_error", "rad s-1", "one standard deviation of the frequency", _NUMBER),
+    ("observed_frequency", "observed", "rad s-1", "frequency before it was unfolded", _NUMBER),
+    ("amplitude", "amplitude", "", "amplitude, in the signal's unit", _NUMBER),
+    ("amplitude_error", "amplitude_error", "", "one standard deviation of the amplitude", _NUMBER),
+    ("phase", "phase", "rad", "phase at time zero", _NUMBER),
+    ("phase_error", "phase_error", "rad", "one standard deviation of the phase at mid-span", _NUMBER),
+    ("mismatch", "mismatch", "rad s-1", "frequency less the frequency of its label", _NUMBER),
+    ("label", "label.text", "", "combination of known frequencies", _WORDS),
+    ("unfolded", "unfolded", "1", "1 where the frequency lies beyond Nyquist's", _FLAG),
+    ("can_be_alias", "can_be_alias", "1", "1 where a line can be an alias of a faster motion", _FLAG),
+    ("ambiguous", "ambiguous", "1", "1 where several combinations fit", _FLAG),
+)
+"""Variables by signal and line: name, attribute, unit, words, kind."""
+_OF_SIGNALS = (
+    ("signal_units", "units", "", "unit of the signal", object),
+    ("real", "real", "1", "1 of a real signal", np.int8),
+    ("secular_value", "value.real", "", "secular part at mid-span", np.float64),
+    ("secular_rate", "rate.real", "", "rate of the secular part, per s", np.float64),
+    ("secular_rate_error", "rate_error", "", "one standard deviation of the rate, per s", np.float64),
+    ("left", "left", "", "rms of the residual without lines and secular part", np.float64),
+    ("noise_level", "level", "", "amplitude below which lines aren't seen", np.float64),
+    ("window_order", "order", "1", "order of the Hann window", np.int64),
+)
+
+
+def _attribute(of: Any, path: str) -> Any:
+    """A value by the names that lead to it; nan where one of them is None."""
+    for name in path.split("."):
+        of = None if of is None else getattr(of, name)
+    return np.nan if of is None else of
+
+
+def _remainder(value: Any, part: int) -> float:
+    return float(value) if part == 0 else _remainder(value - float(value), part - 1)
+
+
 def _dataset(analysis: Analysis) -> xarray.Dataset:
     signals, known = analysis.signals, analysis.known
     longest = max((len(s.lines) for s in signals), default=0)
     data: dict[str, tuple[Any, ...]] = {}
 
-    def put(name: str, dims: tuple[str, ...], values: Any, dtype: Any = np.float64, **attrs: str) -> None:
-        data[name] = (dims, np.array(values, dtype=dtype), attrs)
+    def put(name: str, rows: list[list[Any]], kind: tuple[Any, Any], attrs: dict[str, str]) -> None:
+        padded = [row + [kind[1]] * (longest - len(row)) for row in rows]
+        table = np.array(padded, dtype=kind[0]).reshape(len(signals), longest)
+        data[name] = (("signal", "line"), table, attrs)
 
-    def table(
-        name: str, units: str, words: str, of: Any, dtype: Any = np.float64, fill: Any = np.nan
-    ) -> None:
-        of = attrgetter(of) if isinstance(of, str) else of
-        rows = [[of(line) for line in s.lines] + [fill] * (longest - len(s.lines)) for s in signals]
-        values = np.array(rows, dtype=dtype).reshape(len(signals), longest)
-        put(name, ("signal", "line"), values, dtype, units=units, long_name=words)
-
-    def along(name: str, units: str, words: str, of: Any, dtype: Any = np.float64) -> None:
-        of = attrgetter(of) if isinstance(of, str) else of
-        put(name, ("signal",), [of(s) for s in signals], dtype, units=units, long_name=words)
-
-    def remainder(value: Any, part: int) -> float:
-        return float(value) if part == 0 else remainder(value - float(value), part - 1)
-
-    def real(value: Any) -> float:
-        return np.nan if value is None else float(value.real)
-
-    for part in range(1 if all(s.bits <= 53 for s in signals) else 3):
-        name = part_name("frequency", part)
-        table(name, "rad s-1", "angular frequency", lambda x, p=part: remainder(x.frequency, p))
-        if part:
-            data[name][2]["residual_of"] = "frequency"
-    table("frequency_error", "rad s-1", "one standard deviation of the frequency", "frequency_error")
-    table("observed_frequency", "rad s-1", "frequency before it was unfolded", "observed")
-    table("amplitude", "", "amplitude, in the signal's unit", "amplitude")
-    table("amplitude_error", "", "one standard deviation of the amplitude", "amplitude_error")
-    table("phase", "rad", "phase at time zero", "phase")
-    table("phase_error", "rad", "one standard deviation of the phase at mid-span", "phase_error")
-    table("mismatch", "rad s-1", "frequency less the frequency of its label", "mismatch")
-    table("label", "", "combination of known frequencies", "label.text", object, "")
-    table("unfolded", "1", "1 where the frequency lies beyond Nyquist's", "unfolded", np.int8, 0)
-    table(
-        "can_be_alias", "1", "1 where a line can be an alias of a faster motion", "can_be_alias", np.int8, 0
-    )
-    table("ambiguous", "1", "1 where several combinations fit", "ambiguous", np.int8, 0)
+    for name, path, units, words, kind in _OF_LINES:
+        rows = [[_attribute(line, path) for line in s.lines] for s in signals]
+        put(name, rows, kind, {"units": units, "long_name": words})
+    for part in range(1, 1 if all(s.bits <= 53 for s in signals) else 3):
+        rows = [[_remainder(line.frequency, part) for line in s.lines] for s in signals]
+        words = {"units": "rad s-1", "long_name": "angular frequency", "residual_of": "frequency"}
+        put(part_name("frequency", part), rows, _NUMBER, words)
+    for name, path, units, words, dtype in _OF_SIGNALS:
+        values = np.array([_attribute(s, path) for s in signals], dtype=dtype)
+        data[name] = (("signal",), values, {"units": units, "long_name": words})
     multipliers = np.zeros((len(signals), longest, len(known)), dtype=np.int64)
     curves = np.full((2, len(signals), max((len(s.spectrum[0]) for s in signals), default=0)), np.nan)
     for row, signal in enumerate(signals):
         for column, line in enumerate(signal.lines):
             multipliers[row, column] = line.label.multipliers or 0
-        for which in (0, 1):
-            curves[which, row, : len(signal.spectrum[which])] = signal.spectrum[which]
-    dims, words = ("signal", "line", "known"), "what labels are made of"
-    put("multipliers", dims, multipliers, np.int64, units="1", long_name="of known frequencies")
-    put("known_frequency", ("known",), [float(k.value) for k in known], units="rad s-1", long_name=words)
-    put("known_source", ("known",), [k.source for k in known], object, units="")
-    along("signal_units", "", "unit of the signal", "units", object)
-    along("real", "1", "1 of a real signal", "real", np.int8)
-    along("secular_value", "", "secular part at mid-span", lambda s: real(s.value))
-    along("secular_rate", "", "rate of the secular part, per s", lambda s: real(s.rate))
-    along("secular_rate_error", "", "one standard deviation of the rate, per s", "rate_error")
-    along("left", "", "rms of the residual without lines and secular part", "left")
-    along("noise_level", "", "amplitude below which lines aren't seen", "level")
-    along("window_order", "1", "order of the Hann window", "order", np.int64)
-    put("spectrum_frequency", ("signal", "spectrum"), curves[0], units="rad s-1")
-    put("spectrum_amplitude", ("signal", "spectrum"), curves[1], long_name="windowed amplitude")
+        curves[:, row, : len(signal.spectrum[0])] = signal.spectrum
+    rad_s, made = {"units": "rad s-1"}, {"long_name": "what labels are made of"}
+    along = ("signal", "spectrum")
+    data |= {
+        "multipliers": (
+            ("signal", "line", "known"), multipliers, {"units": "1", "long_name": "of known frequencies"}
+        ),
+        "known_frequency": (("known",), [float(k.value) for k in known], rad_s | made),
+        "known_source": (("known",), np.array([k.source for k in known], dtype=object), {"units": ""}),
+        "spectrum_frequency": (along, curves[0], rad_s),
+        "spectrum_amplitude": (along, curves[1], {"long_name": "windowed amplitude"}),
+    }  # fmt: skip
     attributes = {
         "title": analysis.title,
         "source": "rigidsim analyse",
