@@ -87,11 +87,13 @@ def _geodetic_at_start(scene: Scene) -> list[float]:
     fixed = [float(plain(e)) / 1e3 for e in (c * x + s * y, c * y - s * x, z)]
     found = [float(e) for e in _compiled()[0](np.array(fixed))]
     if found[0] < LEAST:
-        what = f'given "{NRLMSISE}", but the body starts {length_text(found[0] * 1e3)} above the Earth; its '
-        what += (
-            f"network holds from {LEAST:g} km on: start higher, or give density, altitude and scale_height"
+        raise _fault(
+            scene,
+            f'given "{NRLMSISE}", but the body starts {length_text(found[0] * 1e3)} above the Earth; '
+            "its "
+            f"network holds from {LEAST:g} km on: start higher, or give density, altitude and "
+            "scale_height",
         )
-        raise _fault(scene, what)
     return found
 
 

@@ -130,8 +130,12 @@ def _choose_requirements(scene: Scene, loads: Sequence[Load]) -> Requirements:
         for need in states & set(readers):
             readers[need].append(who)
     if readers["attitude"] and not keeps_attitude:
-        what = f'given "{asked}", but {readers["attitude"][0]} reads the attitude; choose "auto"'
-        raise ConfigError(Problem("[integrator] formulation", what))
+        raise ConfigError(
+            Problem(
+                "[integrator] formulation",
+                f'given "{asked}", but {readers["attitude"][0]} reads the attitude; choose "auto"',
+            )
+        )
     rates = "everything else is a function of the rates"
     if record is None or "angular_velocity" in record:
         rates = "angular_velocity is recorded"
@@ -229,8 +233,13 @@ def _check_recordable(scene: Scene, formulation: str, record: list[str] | None) 
             if why is not None:
                 raise ConfigError(Problem("[output] record", f'given "{name}": {why}'))
     if not variables_named(formulation).keeps_attitude and scene.free_flight and record is None:
-        what = f'given "{formulation}" for a scene with a position; name what to record in [output] record, '
-        raise ConfigError(Problem("[integrator] formulation", what + 'or choose "auto"'))
+        raise ConfigError(
+            Problem(
+                "[integrator] formulation",
+                f'given "{formulation}" for a scene with a position; name what to record in [output] '
+                'record, or choose "auto"',
+            )
+        )
 
 
 # --- loads that are refused ---------------------------------------------------------------------------------
@@ -252,15 +261,26 @@ def refuse_second_orbits(scene: Scene, loads: Sequence[Load]) -> None:
             continue
         if load.reacts:
             if any(load.placement == other.placement for other in pulling):
-                what = "given with central_gravity of the same body, which has its torque; remove it"
-                raise ConfigError(Problem(where, what))
+                raise ConfigError(
+                    Problem(
+                        where, "given with central_gravity of the same body, which has its torque; remove it"
+                    )
+                )
         else:
             strength = load.gravitational_parameter
             if known(strength, attractors):
-                what = "given for the point that attracts the body in flight; central_gravity has its torque "
-                what += "where the body is, and this one would follow another orbit: remove it"
-                raise ConfigError(Problem(where, what))
+                raise ConfigError(
+                    Problem(
+                        where,
+                        "given for the point that attracts the body in flight; central_gravity has its "
+                        "torque where the body is, and this one would follow another orbit: remove it",
+                    )
+                )
             if known(strength, carried):
-                what = "given with the gravitational parameter of one of [[bodies]] and another orbit; "
-                what += 'give orbit = {body = "..."}, which is where that body is'
-                raise ConfigError(Problem(where, what))
+                raise ConfigError(
+                    Problem(
+                        where,
+                        "given with the gravitational parameter of one of [[bodies]] and another orbit; "
+                        'give orbit = {body = "..."}, which is where that body is',
+                    )
+                )

@@ -68,8 +68,12 @@ def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list
         if not observable.available(m):
             if record is not None:
                 why = observable.absent(m) if observable.needed(m) else None
-                what = f'given "{observable.name}": {why or "this scene has none"}; leave it out'
-                raise ConfigError(Problem("[output] record", what))
+                raise ConfigError(
+                    Problem(
+                        "[output] record",
+                        f'given "{observable.name}": {why or "this scene has none"}; leave it out',
+                    )
+                )
             continue
         components = observable.expressions(m)
         x, count = observable, len(components)

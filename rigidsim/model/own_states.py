@@ -83,8 +83,12 @@ def refuse_taken_names(scene: Scene, blocks: Iterable[StateBlock]) -> None:
     names = [name for block in blocks for name in block.names]
     for number, table in enumerate(scene.config.states, start=1):
         if names.count(table.name) > 1:
-            what = f'given "{table.name}", which another state of the motion is called already; rename it'
-            raise ConfigError(Problem(f"[[states]] number {number} name", what))
+            raise ConfigError(
+                Problem(
+                    f"[[states]] number {number} name",
+                    f'given "{table.name}", which another state of the motion is called already; rename it',
+                )
+            )
 
 
 def refuse_odd_states(scene: Scene) -> None:
@@ -98,11 +102,12 @@ def refuse_odd_states(scene: Scene) -> None:
     states = random_states(scene) if reading else []
     for state in reading:
         if changes(state.derivative, states, opposite, scene.context):
-            what = (
-                "changes with the sign of the quaternion, while q and -q are the same attitude; use products "
-            )
             raise ConfigError(
-                Problem(state.derivative.where, what + "such as qw*qx, or say where it jumps: sign(qw)*qx")
+                Problem(
+                    state.derivative.where,
+                    "changes with the sign of the quaternion, while q and -q are the same attitude; use "
+                    "products such as qw*qx, or say where it jumps: sign(qw)*qx",
+                )
             )
 
 

@@ -101,9 +101,12 @@ def about_named_strength(given: ExactNumber | None, name: str, where: str) -> It
     meant = known_body(float(given))
     yield from _about_strength(given, body.radius, where)
     if meant is not None and meant is not body:
-        text = f"{where} gravitational_parameter: given {_numbers([given])} m^3/s^2, which is {meant.owner}, "
-        text += f'for "{name}", which has {body.gravitational_parameter:.6g}; correct one of them'
-        yield Caution(WarningCode.STRENGTH_CONTRADICTS, text)
+        yield Caution(
+            WarningCode.STRENGTH_CONTRADICTS,
+            f"{where} gravitational_parameter: given {_numbers([given])} m^3/s^2, which is "
+            f"{meant.owner}, for "
+            f'"{name}", which has {body.gravitational_parameter:.6g}; correct one of them',
+        )
 
 
 def _meant_body(given: ExactNumber) -> KnownBody | None:

@@ -71,11 +71,14 @@ class InSI:
             return getattr(self.internal, name)
         if name in _UNITS:
             return _times(self.internal, getattr(self.internal, name), _UNITS[name](self.internal.scaling))
-        what = (
-            f'asks for "{name}", which the state in SI doesn\'t have; it has {", ".join([*_UNITS, *_SAME])}, '
+        raise ConfigError(
+            Problem(
+                "loads",
+                f'asks for "{name}", which the state in SI doesn\'t have; it has '
+                f"{', '.join([*_UNITS, *_SAME])}, time and units. Loads and observables of users speak SI: "
+                "leave out factors such as 2**-m.scaling.energy (docs/howto/own_load.md)",
+            )
         )
-        what += "time and units. Loads and observables of users speak SI: leave out factors such as "
-        raise ConfigError(Problem("loads", what + "2**-m.scaling.energy (docs/howto/own_load.md)"))
 
     @property
     def time(self) -> Symbolic:
@@ -157,8 +160,9 @@ def _internal(m: Kinematics, value: Any, unit: int, own: Mapping[str, Symbolic])
         return type(value)(_internal(m, x, unit, own) for x in value)
     expression = hy.expression(value)
     if hy.subs(expression, {hy.time: hy.expression(0.0)}) != expression:
-        what = "reads heyoka's time, which is in internal units; write m.time, which is in s"
-        raise ConfigError(Problem("loads", what))
+        raise ConfigError(
+            Problem("loads", "reads heyoka's time, which is in internal units; write m.time, which is in s")
+        )
     found = hy.subs(expression, {_SECONDS: hy.expression(kinematics.seconds(m)), **own})
     return _times(m, found, -unit)
 

@@ -382,9 +382,13 @@ def _refuse_inside(source: SeenSource, far: Any, context: Any) -> None:
     radius = source.radius(context)
     if far <= radius:
         given, distance = (length_text(float(plain(x))) for x in (radius, far))
-        what = f"given {given}, but the body starts {distance} from the source's centre, inside it, where no "
-        what += "shadow is known; check the unit, the orbit and the start"
-        raise ConfigError(Problem(f"[[loads]] number {source.number + 1} radius", what))
+        raise ConfigError(
+            Problem(
+                f"[[loads]] number {source.number + 1} radius",
+                f"given {given}, but the body starts {distance} from the source's centre, inside it, where "
+                "no shadow is known; check the unit, the orbit and the start",
+            )
+        )
 
 
 def _pairs(config: Config) -> Iterator[_Pair]:

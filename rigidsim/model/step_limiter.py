@@ -49,8 +49,14 @@ def pace_block(m: Mechanics, before: StateBlock) -> list[StateBlock]:
     terms += [_along_the_motion(u, derivatives) * (u / (WIDE**2 + u * u)) for _, u in watched]
     titles = ", ".join(dict.fromkeys(title for title, _ in [*watched, *rooted]))
     what = " or ".join(["what is narrow"] * bool(watched) + ["a root of zero"] * bool(rooted))
-    why = f"{titles}: no step may pass over {what} in it"
-    return [StateBlock([PACE], [2.0**-5 * hy.sum(terms)], [m.scene.context.zero], why=why)]
+    return [
+        StateBlock(
+            [PACE],
+            [2.0**-5 * hy.sum(terms)],
+            [m.scene.context.zero],
+            why=f"{titles}: no step may pass over {what} in it",
+        )
+    ]
 
 
 def _arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:

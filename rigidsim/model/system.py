@@ -203,8 +203,11 @@ class System:
         """Invariants of the scene that aren't monitored, and why."""
         if not self.formulation.resolves_rotation or carries_work(self.mechanics):
             return {}
-        why = "neither it nor work is recorded, and no max_drift is given"
-        return {BALANCE[1]: why} if has_balance(self.mechanics) else {}
+        return (
+            {BALANCE[1]: "neither it nor work is recorded, and no max_drift is given"}
+            if has_balance(self.mechanics)
+            else {}
+        )
 
     @property
     def left_out(self) -> list[tuple[str, str]]:

@@ -151,8 +151,10 @@ def _absent(m: Mechanics) -> str | None:
     if m.surfaces.found:
         return "where the equations switch, at a kink or jump, variational equations end"
     if not integrator.has_steps:
-        what = "a closed form takes no steps along which a vector could be carried; "
-        return what + f'choose method = "{DEFAULT_METHOD}"'
+        return (
+            "a closed form takes no steps along which a vector could be carried; choose method = "
+            f'"{DEFAULT_METHOD}"'
+        )
     return None
 
 

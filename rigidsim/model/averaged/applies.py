@@ -169,12 +169,13 @@ def _refuse_resonance(
     if source.passing_rate is not None and source.motion == 0:
         slowest = min(abs(body).min(initial=math.inf), abs(wobble.rates[0]))
         if slowest < PASSING * source.passing_rate:
-            what = (
-                f"the point mass of [[loads]] {source.name} isn't bound to the body and passes it, by their "
+            raise refused(
+                level,
+                f"the point mass of [[loads]] {source.name} isn't bound to the body and passes it, by "
+                f"their motion at the start, at {source.passing_rate:.3g} rad/s, which the body's "
+                f"slowest frequency, {slowest:.3g} rad/s, has to exceed by a factor of {PASSING:.0f}",
+                remedy,
             )
-            what += f"motion at the start, at {source.passing_rate:.3g} rad/s, which the body's slowest "
-            what += f"frequency, {slowest:.3g} rad/s, has to exceed by a factor of {PASSING:.0f}"
-            raise refused(level, what, remedy)
     if not len(sizes):
         return None
     orbit = source.harmonics

@@ -154,8 +154,10 @@ def average_of(
             return _driven(scene, alone, sources, unit(context, vector), scaling, known=along is not None)
         motion = free_motion(context, body, momentum, norm(context, vector))
     except Separatrix:
-        what = "the body turns about its intermediate axis, where its wobble takes forever and nothing "
-        raise refused(table.level, what + "averages") from None
+        raise refused(
+            table.level,
+            "the body turns about its intermediate axis, where its wobble takes forever and nothing averages",
+        ) from None
     start, energy = unit(context, vector), dot(momentum, scene.angular_velocity) / 2
     figure = _figure(scene, motion)
     found = Average(table.level, table.short_period, motion, sources, start, energy, figure)

@@ -140,9 +140,14 @@ class Averaged(Formulation):
 def _amplitudes(m: DrivenMechanics) -> StateBlock:
     """P and Q of a driven motion."""
     unit = m.scaling.momentum
-    why = f"size of the momentum and energy of rotation, under {' and '.join(m.driven.titles)}: its largest "
-    why += "components along the axis that it circles and across it"
-    return StateBlock(AMPLITUDES, m.amplitude_rates, m.driven.states(unit), exponents=[unit] * 2, why=why)
+    return StateBlock(
+        AMPLITUDES,
+        m.amplitude_rates,
+        m.driven.states(unit),
+        exponents=[unit] * 2,
+        why=f"size of the momentum and energy of rotation, under {' and '.join(m.driven.titles)}: its "
+        "largest components along the axis that it circles and across it",
+    )
 
 
 def _refuse_unavailable(average: Average, record: Sequence[str] | None) -> None:
@@ -155,5 +160,6 @@ def _refuse_unavailable(average: Average, record: Sequence[str] | None) -> None:
             why = f'needs every rotation, which [model] level = "{average.level}" averages over'
         else:
             continue
-        what = f'given "{name}": {why}; choose level = "full" to have it'
-        raise ConfigError(Problem("[output] record", what))
+        raise ConfigError(
+            Problem("[output] record", f'given "{name}": {why}; choose level = "full" to have it')
+        )

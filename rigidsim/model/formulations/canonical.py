@@ -105,8 +105,11 @@ def _initial_momenta(scene: Scene, scaling: Scaling, angles: list[Any]) -> list[
 def _hamilton_equations(m: Mechanics) -> list[Symbolic]:
     """Right-hand sides of the three angles and momenta; refused for a load without a potential."""
     if beside := carried_beside(m.loads):
-        what = f'given "canonical", but {beside}; choose another formulation'
-        raise ConfigError(Problem("[integrator] formulation", what))
+        raise ConfigError(
+            Problem(
+                "[integrator] formulation", f'given "canonical", but {beside}; choose another formulation'
+            )
+        )
     parts = [m.rotational_energy]
     for load in m.loads:
         if not load.torque(m):

@@ -430,15 +430,17 @@ class BodyField(ByPlacedSource):
             what = "[body] has no gravity_field; give it, or leave degree out (the inertia tensor "
             raise around.fault("degree", f"given {degree}, but {what}is degree 2)")
         if degree > field.degree:
-            what = f"given {degree}, but [body] gravity_field ends at degree {field.degree}"
-            raise around.fault("degree", what)
+            raise around.fault(
+                "degree", f"given {degree}, but [body] gravity_field ends at degree {field.degree}"
+            )
         if not placement.dynamic and (near := placement.nearest(around)) < field.radius:
             far, radius = (length_text(float(plain(x))) for x in (near, field.radius))
-            what = (
-                f"given for a source that comes to {far} from the body's centre, within the radius of [body] "
+            raise around.fault(
+                "degree",
+                f"given for a source that comes to {far} from the body's centre, within the radius of "
+                f"[body] gravity_field, {radius}, where its series doesn't hold; place it outside, or "
+                "leave degree out",
             )
-            what += f"gravity_field, {radius}, where its series doesn't hold; place it outside, or "
-            raise around.fault("degree", what + "leave degree out")
         return load.part(cls, field=field, degree=degree)
 
 
@@ -594,8 +596,11 @@ class SourceFigure(ByPlacedSource):
             refuse_inside(load, radius, "figure", around)
         elif not placement.dynamic and placement.nearest(around) < radius:
             near, far = (length_text(float(plain(x))) for x in (placement.nearest(around), radius))
-            what = f"given {far}, but the source comes to {near} from the body, which would be within it; "
-            raise around.fault("figure.radius", what + "check both")
+            raise around.fault(
+                "figure.radius",
+                f"given {far}, but the source comes to {near} from the body, which would be within it; "
+                "check both",
+            )
         size = given.J2.at(context) * radius**2
         if isinstance(given.pole, str):
             _refuse_pole(fields.source, around)
@@ -608,13 +613,17 @@ class SourceFigure(ByPlacedSource):
 def refuse_inside(load: Attraction, radius: Any, key: str, around: Setting) -> None:
     """Refuse a radius of the attracting body within which the body starts, and one that moves."""
     if load.attracting_point is None:
-        what = "given for an attracting body that moves; allowed for one at rest, with position"
-        raise around.fault(key, what)
+        raise around.fault(
+            key, "given for an attracting body that moves; allowed for one at rest, with position"
+        )
     far = norm(around.context, load.placement.at_start(around))
     if far < radius:
         given, there = (around.context.nstr(x, 6) for x in (radius, far))
-        what = f"given {given} m, but the body starts {there} m from the attracting point, where the series "
-        raise around.fault(f"{key}.radius", what + "doesn't hold; check both")
+        raise around.fault(
+            f"{key}.radius",
+            f"given {given} m, but the body starts {there} m from the attracting point, where the "
+            "series doesn't hold; check both",
+        )
 
 
 def _refuse_pole(source: str | None, around: Setting) -> None:
@@ -627,17 +636,24 @@ def _refuse_pole(source: str | None, around: Setting) -> None:
     )
     for what, found, example in known:
         if found is None:
-            why = f'given "{EARTH}", a pole of date, which takes {what}; give {example}, or a vector'
-            raise around.fault("figure.pole", why)
+            raise around.fault(
+                "figure.pole",
+                f'given "{EARTH}", a pole of date, which takes {what}; give {example}, or a vector',
+            )
     if source not in (None, "earth", "399", "earth_moon_barycenter"):
-        what = f'given "{EARTH}", the Earth\'s pole, for the source "{source}"; give its own as a vector'
-        raise around.fault("figure.pole", what)
+        raise around.fault(
+            "figure.pole",
+            f'given "{EARTH}", the Earth\'s pole, for the source "{source}"; give its own as a vector',
+        )
     assert around.epoch is not None
     ahead = float(around.epoch.since_j2000())
     far = max(abs(float(plain(t)) + ahead) for t in (around.start, around.end)) / _CENTURY
     if far > _MOST_CENTURIES:
-        what = f'given "{EARTH}" for a run that goes {far:.3g} centuries from J2000; its precession holds '
-        raise around.fault("figure.pole", what + f"for {_MOST_CENTURIES}: give a shorter run, or a vector")
+        raise around.fault(
+            "figure.pole",
+            f'given "{EARTH}" for a run that goes {far:.3g} centuries from J2000; its precession holds '
+            f"for {_MOST_CENTURIES}: give a shorter run, or a vector",
+        )
 
 
 class SourceFieldTable(HarmonicsTable):

@@ -314,8 +314,12 @@ def _raising(config: Config, names: list[str] | None) -> tuple[int, ...]:
             allowed = ", ".join(known) or f"none, since no {_RAISING} has a name"
             raise fault("raised_by", f'given "{name}"{nearest(name, known)}; allowed: {allowed}')
         if kinds[known[name]] != _RAISING:
-            what = f'given "{name}", a load of kind {kinds[known[name]]}; the source of a {_RAISING} raises '
-            raise fault("raised_by", what + "tides: name that, or add one")
+            raise fault(
+                "raised_by",
+                f'given "{name}", a load of kind {kinds[known[name]]}; the source of a {_RAISING} '
+                "raises "
+                "tides: name that, or add one",
+            )
     found = tuple(known[name] for name in names)
     if len(set(found)) < len(found):
         raise fault("raised_by", "the same source is named twice; name each once")
@@ -356,14 +360,21 @@ class Elasticity(Load, Carrier):
         assert table is not None
         love, radius, delay = (x.at(context) for x in (table.love_number, table.radius, table.delay))
         if around.free_flight:
-            what = "given for a body with a position or velocity, whose flight treats it as rigid; leave "
-            raise fault("", what + "out [initial] position and velocity, and give the source's orbit")
+            raise fault(
+                "",
+                "given for a body with a position or velocity, whose flight treats it as rigid; leave "
+                "out [initial] position and velocity, and give the source's orbit",
+            )
         if any(isinstance(x, str) for x in fields.body.principal_moments or []):
-            what = "given with principal_moments that vary; only one of them can change the tensor"
-            raise fault("", what)
+            raise fault("", "given with principal_moments that vary; only one of them can change the tensor")
         if fields.initial.angular_momentum is not None:
-            what = "given with [body] elasticity, on which it depends what the rates are then; give "
-            raise ConfigError(Problem("[initial] angular_momentum", what + "angular_velocity"))
+            raise ConfigError(
+                Problem(
+                    "[initial] angular_momentum",
+                    "given with [body] elasticity, on which it depends what the rates are then; give "
+                    "angular_velocity",
+                )
+            )
         rate = None if table.mean_rate is None else table.mean_rate.at(context)
         raising = _raising(fields, table.raised_by)
         named = [source for n in raising if (source := getattr(fields.loads[n], "source", None)) is not None]
@@ -414,11 +425,11 @@ class Elasticity(Load, Carrier):
         sources = [source for source in found if source is not None]
         for source in sources:
             if why := source.placement.untracked:
-                what = (
-                    f"given a source whose velocity isn't known: {why}; give it an orbit by elements, take "
+                raise fault(
+                    "raised_by",
+                    f"given a source whose velocity isn't known: {why}; give it an orbit by elements, "
+                    "take it from a kernel, make it one of [[bodies]], or name others here",
                 )
-                what += "it from a kernel, make it one of [[bodies]], or name others here"
-                raise fault("raised_by", what)
         return sources
 
     # --- the tensor -----------------------------------------------------------------------------------------
@@ -515,15 +526,17 @@ class Elasticity(Load, Carrier):
         """Of the rate without delay, until what is left is less than rounding."""
         distorted, factor = self.shares(scene)
         if distorted > _MOST:
-            what = f"given numbers by which the tensor changes by up to {float(plain(distorted)):.3g} of the "
-            what += f"least moment; up to {_MOST:g} is allowed, since the response is linear: check "
-            raise fault("", what + "love_number, radius, and G M and distances of the sources")
-        if (angle := self.turned_within(scene)) > _TOO_LATE:
-            what = (
-                f"given {span_words(plain(self.delay))}, in which body and source turn by {angle:.3g} rad; "
-            )
             raise fault(
-                "delay", what + f"up to {_TOO_LATE:g} is allowed, since what it does is a series in it"
+                "",
+                f"given numbers by which the tensor changes by up to {float(plain(distorted)):.3g} of "
+                f"the least moment; up to {_MOST:g} is allowed, since the response is linear: check "
+                "love_number, radius, and G M and distances of the sources",
+            )
+        if (angle := self.turned_within(scene)) > _TOO_LATE:
+            raise fault(
+                "delay",
+                f"given {span_words(plain(self.delay))}, in which body and source turn by {angle:.3g} "
+                f"rad; up to {_TOO_LATE:g} is allowed, since what it does is a series in it",
             )
         least, count = working_epsilon(scene.context) / 4, 0
         left = distorted * factor
@@ -648,11 +661,11 @@ def _rounded(m: Kinematics, matrix: Matrix) -> Matrix:
 def _about_delay(delay: Any, turned: float) -> Iterator[Caution]:
     """A delay whose expansion leaves out a part of what it does."""
     if turned > _LATE:
-        text = (
-            f"{WHERE} delay: in {span_words(delay)} body and source turn by {turned:.2g} rad, of which the "
+        yield Caution(
+            WarningCode.DELAY_TOO_LONG,
+            f"{WHERE} delay: in {span_words(delay)} body and source turn by {turned:.2g} rad, of which "
+            f"the expansion to second order leaves out some {turned**2 / 6:.1%} of what the delay does",
         )
-        text += f"expansion to second order leaves out some {turned**2 / 6:.1%} of what the delay does"
-        yield Caution(WarningCode.DELAY_TOO_LONG, text)
 
 
 def _about_radius(body: Any, scene: Scene) -> Iterator[Caution]:
@@ -663,8 +676,9 @@ def _about_radius(body: Any, scene: Scene) -> Iterator[Caution]:
     largest = float(plain(max(scene.body.principal_moments)))
     if _WIDE[0] < largest / (float(plain(mass)) * (1e3 * float(given)) ** 2) < _WIDE[1]:
         number = f"{float(given):.10g}"
-        text = (
-            f"{WHERE} radius: given {number} without a unit, which is taken as m, while the body's mass and "
+        yield Caution(
+            WarningCode.LENGTH_WITHOUT_UNIT,
+            f"{WHERE} radius: given {number} without a unit, which is taken as m, while the body's mass "
+            "and moments suit as many km; write "
+            f'"{number} km" if that is meant, "{number} m" if not',
         )
-        text += f'moments suit as many km; write "{number} km" if that is meant, "{number} m" if not'
-        yield Caution(WarningCode.LENGTH_WITHOUT_UNIT, text)

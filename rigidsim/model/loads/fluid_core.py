@@ -89,24 +89,37 @@ class FluidCore(Load):
             x.at(context) for x in (table.moment, table.flattening, table.friction)
         )
         if any(x != 0 for x in body.center_of_mass):
-            what = (
-                "given for a body that turns about another point than its centre of mass, about which a core "
+            raise ConfigError(
+                Problem(
+                    "[body] core",
+                    "given for a body that turns about another point than its centre of mass, about which "
+                    "a core would turn; remove reference or center_of_mass",
+                )
             )
-            raise ConfigError(Problem("[body] core", what + "would turn; remove reference or center_of_mass"))
         if fields.initial.angular_momentum is not None and table.angular_velocity is not None:
-            what = "given with angular_velocity of [body] core, from which the body's own would follow; give "
-            raise ConfigError(Problem("[initial] angular_momentum", what + "angular_velocity here, too"))
+            raise ConfigError(
+                Problem(
+                    "[initial] angular_momentum",
+                    "given with angular_velocity of [body] core, from which the body's own would follow; "
+                    "give angular_velocity here, too",
+                )
+            )
         if fields.initial.equilibrium is not None:
-            what = "given for a body with a fluid core, and equilibria are found for rigid bodies; give the "
-            raise ConfigError(Problem("[initial] equilibrium", what + "attitude and rates themselves"))
+            raise ConfigError(
+                Problem(
+                    "[initial] equilibrium",
+                    "given for a body with a fluid core, and equilibria are found for rigid bodies; give "
+                    "the attitude and rates themselves",
+                )
+            )
         largest = context.maximum(body.principal_moments)
         axis = unique_axis(body, context, largest=True)
         if axis is None and flattening != 0 and moment != 0:
-            what = (
-                f"given {_text(flattening)}, but the body's two largest moments are equal, so that no axis "
-                "of largest moment is the core's; 0 is"
+            raise _fault(
+                "flattening",
+                f"given {_text(flattening)}, but the body's two largest moments are equal, so that no "
+                "axis of largest moment is the core's; 0 is",
             )
-            raise _fault("flattening", what)
         rate = None if table.angular_velocity is None else [x.at(context) for x in table.angular_velocity]
         axis = axis or unit_vectors(context)[2]
         made = cls(axis, moment * largest, flattening, friction * largest, rate)
@@ -233,11 +246,12 @@ class FluidCore(Load):
         damping = plain(self.friction / (self.polar * (1 - self.flattening)))
         if fastest > 0 and damping > _STIFF * fastest:
             time, times = value_text(1 / damping, "s"), f"{float(damping / fastest):.2g}"
-            text = (
-                f"[body] core.friction: it takes the core to the mantle's rate in {time}, {times} times as "
+            yield Caution(
+                WarningCode.FRICTION_STIFF,
+                f"[body] core.friction: it takes the core to the mantle's rate in {time}, {times} times "
+                "as fast as anything turns, and steps are as short as that; without a core the motion "
+                "is nearly the same",
             )
-            text += "fast as anything turns, and steps are as short as that; without a core the motion is "
-            yield Caution(WarningCode.FRICTION_STIFF, text + "nearly the same")
 
     # --- what readers see --------------------------------------------------------------------------------
 
@@ -260,12 +274,14 @@ def _refuse_odd_mantle(core: FluidCore, body: RigidBody, context: Any) -> None:
     if all(x > 0 and total - 2 * x >= slack for x in moments):
         return
     listed = ", ".join(context.nstr(plain(x), 8) for x in moments)
-    what = (
-        f"given a moment of {context.nstr(plain(core.polar), 8)} kg m^2, which leaves the mantle the moments "
-        f"{listed} kg m^2, and no body has these (all are positive, and none is more than the sum of the "
-        "others); make the core smaller, or flatten it otherwise"
+    raise ConfigError(
+        Problem(
+            "[body] core",
+            f"given a moment of {context.nstr(plain(core.polar), 8)} kg m^2, which leaves the mantle the "
+            f"moments {listed} kg m^2, and no body has these (all are positive, and none is more than the "
+            "sum of the others); make the core smaller, or flatten it otherwise",
+        )
     )
-    raise ConfigError(Problem("[body] core", what))
 
 
 def _refuse_stiff(core: FluidCore, friction: Any, around: Setting) -> None:
@@ -273,10 +289,11 @@ def _refuse_stiff(core: FluidCore, friction: Any, around: Setting) -> None:
     damping = core.friction / (core.polar * (1 - core.flattening))
     if damping * abs(around.end - around.start) > _MOST_DAMPED:
         time = value_text(1 / plain(damping), "s")
-        what = (
-            f"given {_text(friction)} s^-1, which takes this core to the mantle's rate in {time}, and steps "
+        raise _fault(
+            "friction",
+            f"given {_text(friction)} s^-1, which takes this core to the mantle's rate in {time}, and "
+            "steps are as short: a smaller rate, or no core (moment = 0), is",
         )
-        raise _fault("friction", what + "are as short: a smaller rate, or no core (moment = 0), is")
 
 
 def _text(number: Any) -> str:

@@ -140,12 +140,16 @@ class GravityGradient(SceneLoad):
     def resolve(cls, fields: GravityGradientFields, around: Setting) -> Attraction:
         if fields.orbit is not None and fields.orbit.body is not None:
             if fields.gravitational_parameter is not None:
-                what = "given with orbit.body, which determines it; remove it"
-                raise around.fault("gravitational_parameter", what)
+                raise around.fault(
+                    "gravitational_parameter", "given with orbit.body, which determines it; remove it"
+                )
             masses, number = around.carried_bodies, attracting_body(fields.orbit, around)
             if masses.host is None and masses.full:
-                what = 'given "gravity_gradient" for a body that flies by itself under coupling = "full"; '
-                raise around.fault("kind", what + 'give "central_gravity", whose force the bodies feel')
+                raise around.fault(
+                    "kind",
+                    'given "gravity_gradient" for a body that flies by itself under coupling = "full"; '
+                    'give "central_gravity", whose force the bodies feel',
+                )
             placed = FlownByMass if masses.host is None else PlacedAsMass
             mass: Placement = placed(masses, number)
             return Attraction(gravitational_parameter=masses.strengths[number], placement=mass)
@@ -163,9 +167,13 @@ def _distant(fields: GravityGradientFields, strength: Any, around: Setting) -> P
     if fields.ephemeris is not None:
         refuse_series(around)
         if around.axes not in (None, ECLIPTIC):
-            what = f'given "{around.axes}", but the ephemeris of [[loads]] number {around.number + 1} '
-            what += f'is in "{ECLIPTIC}"; write that, or leave axes out'
-            raise ConfigError(Problem("[frame] axes", what))
+            raise ConfigError(
+                Problem(
+                    "[frame] axes",
+                    f'given "{around.axes}", but the ephemeris of [[loads]] number {around.number + 1} is '
+                    f'in "{ECLIPTIC}"; write that, or leave axes out',
+                )
+            )
         return PlacedBySeries(fields.ephemeris, around.epoch or J2000)
     position = [x.at(around.context) for x in fields.position or []]
     if all(x == 0 for x in position):
@@ -203,8 +211,11 @@ def _flown_by_mass(orbit: Orbit, around: Setting) -> Attraction:
         raise around.fault("orbit", "given without body; the name of one of [[bodies]] is allowed")
     number, masses = attracting_body(orbit, around), around.carried_bodies
     if masses.host is not None:
-        what = 'given "central_gravity", but [body] host makes the body one of [[bodies]], which '
-        raise around.fault("kind", what + 'attract each other anyway; give "gravity_gradient"')
+        raise around.fault(
+            "kind",
+            'given "central_gravity", but [body] host makes the body one of [[bodies]], which attract '
+            'each other anyway; give "gravity_gradient"',
+        )
     place = FlownByMass(masses, number)
     return Attraction(gravitational_parameter=masses.strengths[number], placement=place, pulls=True)
 

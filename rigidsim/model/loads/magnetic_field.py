@@ -138,19 +138,21 @@ def _refuse_elsewhere(fields: MagneticFieldFields, around: Setting) -> None:
     if fields.field_degree is not None and fields.field != IGRF:
         raise around.fault("field_degree", f'given without field = "{IGRF}", whose degree it is; remove it')
     if fields.elements is None and fields.gravitational_parameter is not None:
-        what = "given without an orbit, whose period it is for; remove it"
-        raise around.fault("gravitational_parameter", what)
+        raise around.fault(
+            "gravitational_parameter", "given without an orbit, whose period it is for; remove it"
+        )
     if fields.of_place and fields.elements is None and not around.free_flight:
         key = "field" if fields.field == IGRF else "source_moment"
-        what = (
-            "given for a body without a place; give [initial] position and velocity, or source_moment with "
+        raise around.fault(
+            key,
+            "given for a body without a place; give [initial] position and velocity, or source_moment "
+            "with an orbit, or a uniform field",
         )
-        raise around.fault(key, what + "an orbit, or a uniform field")
     if fields.position is not None and not (around.free_flight and fields.of_place):
-        what = (
-            f'given; allowed with source_moment or "{IGRF}", for a body with [initial] position and velocity'
+        raise around.fault(
+            "position",
+            f'given; allowed with source_moment or "{IGRF}", for a body with [initial] position and velocity',
         )
-        raise around.fault("position", what)
 
 
 # --- fields -------------------------------------------------------------------------------------------------
@@ -269,8 +271,10 @@ def _on_orbit(fields: MagneticFieldFields, around: Setting) -> PlacedOnOrbit:
     assert elements is not None
     for key in ("body", "table"):
         if getattr(elements, key, None) is not None:
-            what = f"given for a {fields.kind}, which takes elements alone; gravity_gradient takes a "
-            raise around.fault(f"{elements.key}.{key}", what + key)
+            raise around.fault(
+                f"{elements.key}.{key}",
+                f"given for a {fields.kind}, which takes elements alone; gravity_gradient takes a " + key,
+            )
     return PlacedOnOrbit(resolve_orbit(elements, None if given is None else given.at(around.context), around))
 
 
@@ -289,9 +293,12 @@ def _flown_about(fields: MagneticFieldFields, around: Setting) -> FlownAbout:
     strengths = [load.gravitational_parameter for load in pulling if load.attracting_point == centre]
     other = next((x for x in strengths if not EARTH.attracts_by(x)), None)
     if fields.field == IGRF and other is not None:
-        what = f'given "{IGRF}", the Earth\'s, where {value_text(other, "m^3/s^2")} attracts the body, which '
-        what += f"isn't the Earth; give source_moment, or {EARTH.gravitational_parameter:g} m^3/s^2"
-        raise around.fault("field", what)
+        raise around.fault(
+            "field",
+            f'given "{IGRF}", the Earth\'s, where {value_text(other, "m^3/s^2")} attracts the body, '
+            "which "
+            f"isn't the Earth; give source_moment, or {EARTH.gravitational_parameter:g} m^3/s^2",
+        )
     if centre == around.position:
         raise around.fault("position", "the body starts at the dipole; start it elsewhere")
     return FlownAbout(strengths[0] if len(strengths) == 1 else None, centre)
@@ -312,8 +319,9 @@ def _earth_field(degree: int | None, placement: FlownAbout, around: Setting) -> 
             igrf(epoch.uniform().after(Decimal(round(plain(second)))), 1)
         frame = earth_axes(epoch, axes, context)
     except ValueError as error:
-        why = f"{given}for a run from {epoch}; {error}: a run within 1970 to 2029 is allowed"
-        raise around.fault("field", why) from None
+        raise around.fault(
+            "field", f"{given}for a run from {epoch}; {error}: a run within 1970 to 2029 is allowed"
+        ) from None
     c = {}
     for (n, m, sine), value in gauss.items():
         share = context.mpf(math.factorial(n - m)) / math.factorial(n + m)
@@ -323,8 +331,11 @@ def _earth_field(degree: int | None, placement: FlownAbout, around: Setting) -> 
     radius, far = context.mpf(RADIUS), norm(context, placement.at_start(around))
     if far < _LEAST * radius:
         there = length_text(float(plain(far)))
-        what = f"{given}the Earth's, but the body starts {there} from its centre, inside it; check "
-        raise around.fault("field", what + "[initial] position and its unit")
+        raise around.fault(
+            "field",
+            f"{given}the Earth's, but the body starts {there} from its centre, inside it; check "
+            "[initial] position and its unit",
+        )
     dipole = [
         radius**3 / context.mpf(_FIELD_CONSTANT) * c[1, *key] for key in ((1, False), (1, True), (0, False))
     ]
@@ -622,6 +633,7 @@ def _of_sphere(fields: EddyCurrentsFields, around: Setting) -> Any:
     if fields.thickness is not None:
         inside = radius - fields.thickness.at(context)
         if inside < 0:
-            what = f"given {float(fields.thickness):g}; more than 0, up to the radius, is allowed"
-            raise around.fault("thickness", what)
+            raise around.fault(
+                "thickness", f"given {float(fields.thickness):g}; more than 0, up to the radius, is allowed"
+            )
     return 2 * context.pi / 15 * fields.conductivity.at(context) * (radius**5 - inside**5)

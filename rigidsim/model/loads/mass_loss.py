@@ -73,14 +73,20 @@ class MassLoss(Load):
         context = around.context
         rate = around.expression("rate", fields.rate, "kg/s")
         if around.free_flight:
-            what = "given for a body with a position or velocity, whose flight has a constant mass; "
-            raise around.fault("mass_loss", what + "leave out [initial] position and velocity")
+            raise around.fault(
+                "mass_loss",
+                "given for a body with a position or velocity, whose flight has a constant mass; leave "
+                "out [initial] position and velocity",
+            )
         point = [x.at(context) for x in fields.exit_point]
         arm = [x - c for x, c in zip(point, around.body.center_of_mass, strict=True)]
         radius, length = fields.exit_radius.at(context), norm(context, arm)
         if radius != 0 and length == 0:
-            what = "given the centre of mass, from which the axis of a round exit points to its middle; "
-            raise around.fault("exit_point", what + "give another point, or leave out exit_radius")
+            raise around.fault(
+                "exit_point",
+                "given the centre of mass, from which the axis of a round exit points to its middle; "
+                "give another point, or leave out exit_radius",
+            )
         geometry = []
         for i, x in enumerate(arm):
             row = [-x * y for y in arm]
@@ -103,9 +109,13 @@ class MassLoss(Load):
         """Refused with a weight, whose torque is for a constant mass."""
         context, scaling = m.scene.context, m.scaling
         if m.scene.torque_arm is not None:
-            what = "given with uniform_gravity on a body that is held off its centre of mass, whose weight "
-            what += "takes a constant mass; hold it at its centre of mass"
-            raise ConfigError(Problem(self.rate.where, what))
+            raise ConfigError(
+                Problem(
+                    self.rate.where,
+                    "given with uniform_gravity on a body that is held off its centre of mass, whose "
+                    "weight takes a constant mass; hold it at its centre of mass",
+                )
+            )
         (rate,), terms = written(m, [self.rate]), []
         for column, (state, unit) in enumerate(zip(m.rate_states, m.numbers.rate_units, strict=True)):
             size = context.ldexp(unit, -scaling.time - scaling.energy)

@@ -64,21 +64,26 @@ class Rotor(Load):
         context, body = around.context, around.body
         axis, moment = [x.at(context) for x in fields.axis], fields.moment.at(context)
         if min(body.principal_moments) == 0:
-            what = "given in a body without a moment about one of its axes, which a rotor can't turn; remove "
-            raise around.fault("", what + "the rotor, or give the body all three moments")
+            raise around.fault(
+                "",
+                "given in a body without a moment about one of its axes, which a rotor can't turn; "
+                "remove the rotor, or give the body all three moments",
+            )
         if moment == 0 and not fields.fixed:
             raise around.fault("moment", "given 0; a positive moment is allowed")
         if fields.fixed and fields.torque is not None:
-            what = "given with fixed = true, which keeps the rate by whatever torque that takes; remove one"
-            raise around.fault("torque", what)
+            raise around.fault(
+                "torque",
+                "given with fixed = true, which keeps the rate by whatever torque that takes; remove one",
+            )
         own = dot(axis, apply(body.inertia, axis)) / dot(axis, axis)
         if moment > own:
-            what = (
+            raise around.fault(
+                "moment",
                 f"given {context.nstr(moment, 8)} kg m^2, more than the body's own about this axis, "
                 f"{context.nstr(own, 8)} kg m^2, which includes the rotor as if it were locked; make it "
-                "smaller, or add the rotor's tensor to [body]'s"
+                "smaller, or add the rotor's tensor to [body]'s",
             )
-            raise around.fault("moment", what)
         motor = None if fields.torque is None else around.expression("torque", fields.torque, "N m")
         size = norm(context, axis)
         axis = [x / size if x != 0 else context.zero for x in axis]
@@ -135,8 +140,13 @@ class Rotor(Load):
         factor = m.number(context.ldexp(context.one, m.scaling.time - unit))
         start = context.ldexp(self.starting_momentum(m.scene), -unit)
         slope = factor * written(m, [self.motor])[0]
-        why = f"momentum of {self.title} about its axis, which its motor changes"
-        return StateBlock([self._state], [slope], [start], exponents=[unit], why=why)
+        return StateBlock(
+            [self._state],
+            [slope],
+            [start],
+            exponents=[unit],
+            why=f"momentum of {self.title} about its axis, which its motor changes",
+        )
 
     def _momentum(self, m: Kinematics) -> tuple[Any, Symbolic]:
         """The momentum about its axis, kg m^2/s, as a constant (mpf) times an expression."""

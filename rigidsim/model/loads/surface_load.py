@@ -194,8 +194,11 @@ class Pushes:
         """Surfaces of the body, counted from 1; refused if there are none."""
         body = self.around.body
         if not body.surfaces:
-            what = "given for a body without surfaces; give [[body.surfaces]], such as normal and area of a "
-            raise self.around.fault("", what + "plate, size of a box, or radius of a sphere")
+            raise self.around.fault(
+                "",
+                "given for a body without surfaces; give [[body.surfaces]], such as normal and area of "
+                "a plate, size of a box, or radius of a sphere",
+            )
         yield from enumerate(body.surfaces, start=1)
 
     def on_sphere(self, sphere: OuterSurface, size: Any, *, speed: bool = False) -> None:
@@ -289,8 +292,11 @@ class Drag(SurfaceLoad):
     @classmethod
     def resolve(cls, fields: DragFields, around: Setting) -> Drag:
         if not around.free_flight or RELATIVE_NAMES[0] not in around.names:
-            what = "given without a velocity relative to the air; it takes [initial] position and velocity, "
-            raise around.fault("", what + "and a central_gravity (atmosphere_rate there turns the air)")
+            raise around.fault(
+                "",
+                "given without a velocity relative to the air; it takes [initial] position and "
+                "velocity, and a central_gravity (atmosphere_rate there turns the air)",
+            )
         pushes = Pushes(around, cls.title, RELATIVE_NAMES)
         half, factors, law = around.context.one / 2, [], None
         if (fields.density == NRLMSISE) != (fields.ap is not None):
@@ -300,8 +306,7 @@ class Drag(SurfaceLoad):
             factors.append(pushes.parsed(AIR_DENSITY))
         elif isinstance(fields.density, ExactNumber):
             if fields.density.sign < 0:
-                what = f"given {float(fields.density):g}; zero or more is allowed"
-                raise around.fault("density", what)
+                raise around.fault("density", f"given {float(fields.density):g}; zero or more is allowed")
             half = half * fields.density.at(around.context)
         else:
             law = around.expression("density", fields.density, "kg/m^3")
@@ -345,8 +350,12 @@ class DragInThermosphere(Drag):
     """Drag in NRLMSISE-00, which ends where the network of it does."""
 
     def range_ends(self, m: Kinematics) -> list[tuple[str, Symbolic]]:
-        why = f"the altitude fell below {LEAST:g} km, from which NRLMSISE-00 is known here"
-        return [(why, (height(m) - LEAST) / LEAST + 2.0**-20)]  # 14 cm: a run may start at the limit
+        return [
+            (
+                f"the altitude fell below {LEAST:g} km, from which NRLMSISE-00 is known here",
+                (height(m) - LEAST) / LEAST + 2.0**-20,
+            )
+        ]  # 14 cm: a run may start at the limit
 
 
 def _altitudes(scene: Scene) -> tuple[Any, Any] | None:
@@ -388,11 +397,14 @@ def _falling(fields: DragFields, around: Setting) -> list[Expression]:
     if fields.scale_height is None or fields.altitude is None:
         return []
     if not isinstance(fields.density, ExactNumber):
-        what = "given with an expression for density, which determines its fall; remove it and altitude"
-        raise around.fault("scale_height", what)
+        raise around.fault(
+            "scale_height",
+            "given with an expression for density, which determines its fall; remove it and altitude",
+        )
     if "altitude" not in around.names:
-        what = "given without a surface to count from; give the central_gravity a radius"
-        raise around.fault("altitude", what)
+        raise around.fault(
+            "altitude", "given without a surface to count from; give the central_gravity a radius"
+        )
     given = {"base": fields.altitude.alone, "scale_height": fields.scale_height.alone}
     return [around.expression("drag", "exp((base - altitude)/scale_height)", parameters=given)]
 

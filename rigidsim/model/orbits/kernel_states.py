@@ -179,8 +179,13 @@ class KernelStates:
                     names += [_name(series, axis, order) for axis in range(3)]
                     derivatives += [self._component(series, axis, order + 1) for axis in range(3)]
                     initial += [context.ldexp(x, shift) for x in series.at(context, now, order)]
-        why = f"positions of {self.names} by {self.ephemeris.kernel.name}, and the time within their blocks"
-        return StateBlock(names, [hy.expression(x) for x in derivatives], initial, why=why)
+        return StateBlock(
+            names,
+            [hy.expression(x) for x in derivatives],
+            initial,
+            why=f"positions of {self.names} by {self.ephemeris.kernel.name}, and the time within their "
+            "blocks",
+        )
 
     def pieces(self) -> list[PieceSeries]:
         """What is set at the edges of blocks."""

@@ -71,8 +71,10 @@ class PlacedByKernel(Placement):
 
     @property
     def without_elements(self) -> tuple[str, str]:  # type: ignore[override]
-        against = f'the kernel gives places of "{self.name}", and no elements to average over'
-        return against, 'choose "spin_averaged", or give it an orbit with a node_rate'
+        return (
+            f'the kernel gives places of "{self.name}", and no elements to average over',
+            'choose "spin_averaged", or give it an orbit with a node_rate',
+        )
 
     def distance(self, context: Any) -> Any:
         return context.ldexp(context.mpf(1000), self.sight.exponent)
@@ -170,23 +172,28 @@ def refuse_same_sources(loads: Iterable[Any], host: str | None) -> None:
             continue
         where = f"[[loads]] number {number} source"
         if (load.kind, name) in seen:
-            what = f'given "{name}", as in another {load.kind}, by which it acts twice; remove one of them'
-            raise ConfigError(Problem(where, what))
+            raise ConfigError(
+                Problem(
+                    where,
+                    f'given "{name}", as in another {load.kind}, by which it acts twice; remove one of them',
+                )
+            )
         seen.add((load.kind, name))
         parts = [x for x in _PARTS if (load.kind, x) in seen or x == host]
         if (load.kind, _BOTH) in seen and parts:
-            what = (
-                f'given "{name}", but the mass of "{_BOTH}" contains "{parts[0]}", a source or the body as '
+            raise ConfigError(
+                Problem(
+                    where,
+                    f'given "{name}", but the mass of "{_BOTH}" contains "{parts[0]}", a source or the body '
+                    'as well; give "earth" and "moon", or one of them',
+                )
             )
-            what += 'well; give "earth" and "moon", or one of them'
-            raise ConfigError(Problem(where, what))
 
 
 def kernel_body(source: str, around: Setting) -> Ephemeris:
     """The ephemeris that has a body which a load names; refused if none has."""
     if around.ephemeris is None:
-        what = f'given "{source}", but there is no [ephemeris]; add one with a kernel'
-        raise around.fault("source", what)
+        raise around.fault("source", f'given "{source}", but there is no [ephemeris]; add one with a kernel')
     around.ephemeris.check_body(source, lambda what: around.fault("source", what))
     return around.ephemeris
 
@@ -194,5 +201,8 @@ def kernel_body(source: str, around: Setting) -> Ephemeris:
 def refuse_series(around: Setting) -> None:
     """Refuse analytic series beside a kernel whose axes they don't share."""
     if around.ephemeris is not None and around.axes is None:
-        what = 'given with [ephemeris], whose axes are ICRF unless [frame] axes = "ecliptic J2000"; set '
-        raise around.fault("ephemeris", what + "that, or give source instead")
+        raise around.fault(
+            "ephemeris",
+            'given with [ephemeris], whose axes are ICRF unless [frame] axes = "ecliptic J2000"; set '
+            "that, or give source instead",
+        )

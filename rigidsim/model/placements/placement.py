@@ -456,9 +456,13 @@ class PlacedAsMass(AmongMasses):
 
     @property
     def without_elements(self) -> tuple[str, str]:  # type: ignore[override]
-        against = f'the orbit of the point mass "{self.name}" is integrated, so that there is no '
-        remedy = 'choose "spin_averaged", or write the elements of the orbit into a table '
-        return against + "ellipse to average over", remedy + '(orbit = {table = "elements.csv"})'
+        return (
+            f'the orbit of the point mass "{self.name}" is integrated, so that there is no ellipse to '
+            "average over"
+        ), (
+            'choose "spin_averaged", or write the elements of the orbit into a table (orbit = {table = '
+            '"elements.csv"})'
+        )
 
     def distance(self, context: Any) -> Any:
         """Semi-major axis at the start, or the least distance of one that isn't bound."""
