@@ -37,7 +37,7 @@ import heyoka as hy
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.orbit_planes import OrbitPlane, flight_plane, kepler_plane, table_plane
+from rigidsim.model.placements import OrbitPlane, flight_plane, kepler_plane, table_plane
 from rigidsim.model.probing import keeps
 from rigidsim.model.rotations import Symbolic, along, apply, transpose, unit
 from rigidsim.scene import attitude

@@ -26,7 +26,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.placements.placement import SourcePlace
+from rigidsim.model.placements import SourcePlace
 from rigidsim.model.rotations import Symbolic, along
 from rigidsim.model.scaling import Rounder
 from rigidsim.scene.arithmetic import (

@@ -13,11 +13,9 @@ from typing import Any
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.inertia import MassDistribution
-from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.kinematics import Kinematics, MassDistribution
 from rigidsim.model.names import written
-from rigidsim.model.orbit_planes import OrbitPlane
-from rigidsim.model.placements.placement import NOWHERE, Placement, SourcePlace
+from rigidsim.model.placements import NOWHERE, OrbitPlane, Placement, SourcePlace
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.si import speaks_si
 from rigidsim.model.state_blocks import StateBlock

@@ -21,8 +21,7 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.carriers import Carrier
-from rigidsim.model.formulations.formulation import ModelPlan, Requirements
-from rigidsim.model.formulations.plain import quaternion_states
+from rigidsim.model.formulations.formulation import ModelPlan, Requirements, quaternion_states
 from rigidsim.model.kinematics import in_common_unit
 from rigidsim.model.load import Load, Term, force_terms, loads_of, torque_terms
 from rigidsim.model.mechanics import Mechanics

@@ -16,20 +16,20 @@ from rigidsim.model.formulations.formulation import (
     REGISTERED,
     Formulation,
     ModelPlan,
+    Planar,
+    Quaternion,
+    Rates,
     Requirements,
     Unsuited,
 )
-from rigidsim.model.formulations.plain import Quaternion, Rates
-from rigidsim.model.formulations.planar import Planar
 from rigidsim.model.frames import refuse_without_plane
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.load_estimate import estimate_drive, orbit_tags
-from rigidsim.model.loads.attraction import Attraction
-from rigidsim.model.loads.uniform_gravity import UniformGravity
+from rigidsim.model.loads.gravity import Attraction, UniformGravity
 from rigidsim.model.observables.observable import NEEDS
-from rigidsim.model.orbits.prescribed import places_of
+from rigidsim.model.orbits import places_of
 from rigidsim.model.own_states import own_units, refuse_odd_states
-from rigidsim.model.placements.kernel_body import refuse_same_sources
+from rigidsim.model.placements import refuse_same_sources
 from rigidsim.model.scaling import Scaling, choose_scaling, scaled_numbers
 from rigidsim.scene.choices import AUTO, variables_named
 from rigidsim.scene.expressions.tree import readables, states_read

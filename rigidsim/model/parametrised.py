@@ -21,14 +21,12 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.formulations.formulation import ModelPlan
-from rigidsim.model.formulations.plain import Quaternion
+from rigidsim.model.formulations.formulation import ModelPlan, Quaternion
 from rigidsim.model.load import Load
 from rigidsim.model.model_plan import plan_model
-from rigidsim.model.outputs import recorded_variables
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
-from rigidsim.model.system import System
+from rigidsim.model.system import System, recorded_variables
 from rigidsim.scene.arithmetic import context_for, negligible
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.varied_keys import VariedKey, scene_of

@@ -16,10 +16,10 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.inertia import MassDistribution
+from rigidsim.model.kinematics import MassDistribution
 from rigidsim.model.load import Load, Term, force_terms, torque_terms
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.orbits.prescribed import KeplerParts, OrbitStates
+from rigidsim.model.orbits import KeplerParts, OrbitStates
 from rigidsim.model.scaling import choose_scaling, scaled_numbers
 from rigidsim.model.state_blocks import AttitudeStates, StateBlock
 from rigidsim.scene import attitude

@@ -38,7 +38,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load_words import length_text
 from rigidsim.model.names import in_si
-from rigidsim.model.placements.placement import SourcePlace
+from rigidsim.model.placements import SourcePlace
 from rigidsim.model.rotations import apply, transpose
 from rigidsim.model.two_part import rounded
 from rigidsim.scene.arithmetic import Vector, bits_in_use, cross, norm

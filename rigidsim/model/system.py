@@ -1,23 +1,31 @@
-"""The system of equations that a scene needs, ready to be integrated and recorded."""
+"""The system of equations that a scene needs, and its outputs: variables that are recorded, quantities that
+are conserved, their watched drifts, and which invariants are projected onto their initial values during a
+run.
+
+An invariant that follows from others would only make the correction ill-determined, so each set is minimal:
+L in space axes stands for its norm, six products of rows for a matrix's orthogonality. Norms are taken
+squared, since a root has no gradient where it vanishes.
+"""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import heyoka as hy
 
+import rigidsim.model.observables.mechanical  # noqa: F401  (enters what it defines into the registry)
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.euler_poles import Poles
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.names import above_zero, carries_sign, plain_angles, written
-from rigidsim.model.observables.mechanical import WORK
-from rigidsim.model.observables.observable import BALANCE, carries_work, has_balance
-from rigidsim.model.orbits.pieces import Pieces, PieceSeries
-from rigidsim.model.orbits.prescribed import TablePieces
-from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
+from rigidsim.model.observables.mechanical import WATCHED, WORK
+from rigidsim.model.observables.observable import BALANCE, Observable, carries_work, has_balance
+from rigidsim.model.orbits import Pieces, PieceSeries, TablePieces
 from rigidsim.model.own_states import own_blocks, refuse_taken_names
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
@@ -28,6 +36,134 @@ from rigidsim.scene.expressions.names import EULER_NAMES
 from rigidsim.scene.expressions.tree import bounds
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.own_states import OwnState
+from rigidsim.scene.registry import OBSERVABLES
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """One recorded variable of the dataset.
+
+    Samples are joined as ``continuity`` says: "" (as they are), "wrapped" (angles that are states), "unwrap"
+    (angles that are functions of the state), "parity" and "nearest" (quaternion signs).
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+    frame: str
+    first: int  # position of its components in ``System.outputs``
+    count: int
+    exponents: list[int]  # binary, that bring the components to SI
+    invariant: bool
+    continuity: str = ""
+    squared_sizes: list[Symbolic] = field(default_factory=list)  # vanish where angles are undefined
+    poles: Poles | None = None  # for Euler angles that are functions of the state
+    attributes: Mapping[str, str] = field(default_factory=dict)  # besides units, long name and frame
+
+
+@dataclass(frozen=True)
+class Invariant:
+    """A quantity that the motion conserves, and the drift that is watched."""
+
+    name: str
+    why: str  # it is conserved
+    units: str
+    long_name: str
+    expressions: list[Symbolic]  # its components, in internal units
+    exponents: list[int]  # binary, of the components' units
+    scale: Any  # what drifts are relative to, SI (mpf)
+    scale_name: str
+    numerical: bool = False  # of the numerical representation alone (a quaternion's norm)
+
+
+def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list[Recorded], list[Symbolic]]:
+    """The variables of the dataset, and all their components; what a scene lacks is refused."""
+    recorded: list[Recorded] = []
+    outputs: list[Symbolic] = []
+    for observable in [*OBSERVABLES.values(), *(_of_state(m, state) for state in m.scene.states)]:
+        wanted = observable.by_default(m) if record is None else observable.name in record
+        if not wanted:
+            continue
+        if not observable.available(m):
+            if record is not None:
+                why = observable.absent(m) if observable.needed(m) else None
+                raise ConfigError(
+                    Problem(
+                        "[output] record",
+                        f'given "{observable.name}": {why or "this scene has none"}; leave it out',
+                    )
+                )
+            continue
+        components = observable.expressions(m)
+        x, count = observable, len(components)
+        sizes = [] if x.angles is None else [angle.squared_size for angle in x.angles(m)]
+        variable = Recorded(
+            x.name, x.dims, x.units, x.long_name, x.frame, len(outputs), count, x.unit_exponents(m, count),
+            x.conserved(m) is not None, x.continuity(m), sizes, x.poles(m), x.attributes(m),
+        )  # fmt: skip
+        recorded.append(variable)
+        outputs += components
+    return recorded, outputs
+
+
+def _of_state(m: Mechanics, state: OwnState) -> Observable:
+    """The recorded variable of a user-defined state, which default records have."""
+    unit = m.scaling.own.get(state.name, 0)
+    return Observable(
+        state.name, (), state.unit or "1", f"{state.name}, a state of [[states]]",
+        lambda _: [hy.make_vars(state.name)], lambda _: [unit],
+        attributes=lambda _: {"given_by": "[[states]]"},
+    )  # fmt: skip
+
+
+_UNIT = "1 by definition: any drift is rounding"
+_WATCHED = {"orthogonality_defect": "0 by definition: any drift is rounding"}
+
+
+def find_invariants(m: Mechanics, norms: list[Symbolic]) -> list[Invariant]:
+    """All invariants of the scene; ``norms`` of orbits that are states stay 1 by construction."""
+    found = []
+    for observable in OBSERVABLES.values():
+        if observable.drift_scale is None or not observable.available(m):
+            continue
+        why = observable.conserved(m)
+        if why is None:
+            continue
+        scale, scale_name = observable.drift_scale(m)
+        expressions, x = observable.expressions(m), observable
+        exponents = x.unit_exponents(m, len(expressions))
+        found.append(Invariant(x.name, why, x.units, x.long_name, expressions, exponents, scale, scale_name))
+    one = m.scene.context.one
+    watched: list[tuple[str, str, str, Symbolic]] = [
+        (f"orbit_norm_{number}", _UNIT, "norm of a cosine and sine that an orbit is carried by", expression)
+        for number, expression in enumerate(norms, 1)
+    ]
+    if m.attitude is not None and m.attitude.defect is not None:
+        name, long_name, expression = m.attitude.defect
+        watched.append((name, _WATCHED.get(name, _UNIT), long_name, expression))
+    if m.attitude is None and m.vertical is not None:
+        norm = hy.sqrt(hy.sum([v * v for v in m.vertical]))
+        watched.append(("vertical_norm", _UNIT, "norm of the vertical in body axes", norm))
+    for name, why, long_name, expression in watched:
+        found.append(Invariant(name, why, "1", long_name, [expression], [0], one, "1", numerical=True))
+    return found
+
+
+def drift_outputs(invariants: list[Invariant], context: Any, number: Rounder) -> list[Symbolic]:
+    """Relative drifts (value - initial) / scale; for a vector, the norm of the difference over the scale."""
+    drifts = []
+    first = 0
+    for invariant in invariants:
+        inverse = number(context.ldexp(1, invariant.exponents[0]) / invariant.scale)
+        differences = [x - hy.par[first + n] for n, x in enumerate(invariant.expressions)]
+        first += len(differences)
+        single = len(differences) == 1
+        size = differences[0] if single else hy.sqrt(hy.sum([d * d for d in differences]))
+        drifts.append(inverse * size)
+    return drifts
+
 
 _LARGEST_EXPONENT = 1000  # of a recorded variable in SI: float64 ends at 2^1024, and sizes are known roughly
 _DIRECTIONS = {"any": 0, "up": 1, "down": -1}
@@ -106,7 +242,7 @@ class System:
         """The same system in the chart that a run changes to near the singularity; None without a chart.
 
         Its recorded Euler angles follow this system's sequence, on the branch given by the parameter
-        after the invariants' (see ``rigidsim.model.formulations.euler_angles``).
+        after the invariants' (see ``rigidsim.model.formulations.formulation``).
         """
         partner = self.formulation.partner
         if partner is None:
@@ -451,3 +587,76 @@ def _load_blocks(m: Mechanics) -> list[StateBlock]:
         if own is not None:
             blocks.append(replace(own, why=own.why or f"{load.title}: where its source is"))
     return blocks
+
+
+@dataclass(frozen=True)
+class ProjectedScalar:
+    """One scalar equation of a projected invariant, in internal units."""
+
+    name: str  # of the invariant that it belongs to
+    expression: Symbolic
+    scale: Any  # size that its drift is relative to (mpf)
+
+
+# invariant: (another one that stands for it if present, why it needn't be projected itself)
+_FOLLOWS = {
+    "angular_momentum_norm": ("angular_momentum", "its three components are projected"),
+    "energy": ("rotational_energy", "its rotational part is projected; nothing turns the flight's velocity"),
+}
+_ALONE = "it is watched alone: what is projected is a set that keeps the numbers of earlier runs"
+_NEVER = {
+    "energy_balance": "it checks a work that is integrated with the motion and doesn't act on it",
+    **{observable.name: _ALONE for observable in WATCHED},
+}
+
+
+def _squared_rows(m: Mechanics) -> list[Symbolic]:
+    r = m.matrix
+    return [hy.sum([r[i][k] * r[j][k] for k in range(3)]) for i in range(3) for j in range(i + 1)]
+
+
+# squares that stand for roots that can vanish: their scalars, and the relative drift in terms of the root's
+_SQUARES: dict[str, tuple[Callable[[Mechanics], list[Symbolic]], int]] = {
+    "angular_momentum_norm": (lambda m: [hy.sum([x * x for x in m.momentum_body])], 2),
+    "quaternion_norm": (lambda m: [hy.sum([x * x for x in m.carried(m.attitude).variables])], 2),
+    "vertical_norm": (lambda m: [hy.sum([x * x for x in m.carried(m.vertical)])], 2),
+    "orthogonality_defect": (_squared_rows, 1),
+}
+
+
+def conserves(system: System) -> bool:
+    """Whether any projected invariant is one of the motion, not just of its numerical representation."""
+    return any(not found.numerical and found.name not in _NEVER for found in system.invariants)
+
+
+def projected_invariants(system: System) -> tuple[list[ProjectedScalar], list[tuple[str, str]]]:
+    """Scalars to project, and (invariant, why) for the invariants that are not projected themselves."""
+    m = system.mechanics
+    context = m.scene.context
+    present = {invariant.name for invariant in system.invariants}
+    projected: list[ProjectedScalar] = []
+    left_out: list[tuple[str, str]] = []
+    for invariant in system.invariants:
+        name = invariant.name
+        scale = context.ldexp(invariant.scale, -invariant.exponents[0])
+        stand_in, why = _FOLLOWS.get(name, ("", ""))
+        if stand_in in present:
+            left_out.append((name, why))
+        elif name in _NEVER:
+            left_out.append((name, _NEVER[name]))
+        elif name in _SQUARES:
+            expressions, factor = _SQUARES[name]
+            projected += [
+                ProjectedScalar(name, expression, factor * scale * scale) for expression in expressions(m)
+            ]
+        else:
+            projected += [ProjectedScalar(name, expression, scale) for expression in invariant.expressions]
+    if not projected:
+        raise ConfigError(
+            Problem(
+                "[integrator] hold_invariants",
+                f"given true, but the loads leave nothing constant that {system.formulation.name} "
+                'carries; set it to false, or choose formulation = "quaternion", whose norm can be projected',
+            )
+        )
+    return projected, left_out

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.loads.rotor import rotors_of
-from rigidsim.model.orbits.kernel_states import sights_of
-from rigidsim.model.outputs import Invariant
+from rigidsim.model.loads.inner_bodies import rotors_of
+from rigidsim.model.orbits import sights_of
+from rigidsim.model.system import Invariant
 from rigidsim.scene.kernels.ephemeris import date_of
 from rigidsim.scene.scene import Scene
 from rigidsim.session.dates import Dates

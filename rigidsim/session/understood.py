@@ -7,8 +7,8 @@ from rigidsim.model.formulations.formulation import ModelPlan
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.load_estimate import effects_at_start
 from rigidsim.model.load_words import length_text
-from rigidsim.model.loads.uniform_gravity import UniformGravity
-from rigidsim.model.placements.flight import FlownByKernel
+from rigidsim.model.loads.gravity import UniformGravity
+from rigidsim.model.placements import FlownByKernel
 from rigidsim.model.plausibility import about_load, about_named_strength
 from rigidsim.model.sources import sources_of
 from rigidsim.scene import attitude

@@ -8,8 +8,7 @@ import heyoka as hy
 import mpmath
 import numpy as np
 
-from rigidsim.model.outputs import Recorded
-from rigidsim.model.system import System
+from rigidsim.model.system import Recorded, System
 from rigidsim.solve.checkpoint import Arrays
 from rigidsim.solve.compiled import CompiledFunction, compiled_function, evaluate_rows, interruptible
 from rigidsim.solve.effects.angle_wrapping import AngleWrapping

@@ -13,13 +13,12 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.formulations.plain import Quaternion
+from rigidsim.model.formulations.formulation import Quaternion
 from rigidsim.model.model_plan import plan_model
 from rigidsim.model.observables.mechanical import WORK
-from rigidsim.model.outputs import drift_outputs
 from rigidsim.model.state_blocks import BODY
 from rigidsim.model.step_limiter import PACE
-from rigidsim.model.system import System
+from rigidsim.model.system import System, drift_outputs
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.compiled import compiled_engine, compiled_function, evaluate_rows
 from rigidsim.solve.precision import Precision, precision_of

@@ -15,9 +15,8 @@ from rigidsim.errors import ConfigError, Problem, Remedy
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import Load, own_loads
 from rigidsim.model.model_plan import plan_model
-from rigidsim.model.projected_invariants import conserves, projected_invariants
 from rigidsim.model.scaling import gyroscopic_rate
-from rigidsim.model.system import System, build_system
+from rigidsim.model.system import System, build_system, conserves, projected_invariants
 from rigidsim.model.two_part import in_two_parts
 from rigidsim.scene.choices import AUTO, FORMULATIONS
 from rigidsim.scene.config import Experiment

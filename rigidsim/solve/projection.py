@@ -28,10 +28,9 @@ import heyoka as hy
 import mpmath
 import numpy as np
 
-from rigidsim.model.projected_invariants import projected_invariants
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
-from rigidsim.model.system import System
+from rigidsim.model.system import System, projected_invariants
 from rigidsim.solve.compiled import CompiledFunction, compiled_function
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 

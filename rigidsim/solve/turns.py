@@ -24,9 +24,8 @@ import numpy as np
 
 from rigidsim.model.euler_poles import UNDEFINED
 from rigidsim.model.frames import plane_drift
-from rigidsim.model.outputs import Recorded
 from rigidsim.model.scaling import source_rate
-from rigidsim.model.system import System
+from rigidsim.model.system import Recorded, System
 from rigidsim.scene.rotations import AXES, is_proper, parity
 from rigidsim.solve.checkpoint import Arrays
 from rigidsim.solve.compiled import CompiledFunction, evaluate_rows, interruptible

@@ -13,8 +13,8 @@ import mpmath
 from rigidsim.analysis.labels import Known
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import loads_of
-from rigidsim.model.loads.elasticity import Elasticity
-from rigidsim.model.loads.fluid_core import FluidCore, core_of
+from rigidsim.model.loads.changing_tensor import Elasticity
+from rigidsim.model.loads.inner_bodies import FluidCore, core_of
 from rigidsim.model.sources import in_body_axes
 from rigidsim.scene.arithmetic import Vector, dot, norm
 from rigidsim.scene.scene import Scene

@@ -9,7 +9,7 @@ from rigidsim.accuracy.choice import CHEAPEST_FIRST, LevelChoice
 from rigidsim.accuracy.modelling import Unmeasured, measure_modelling
 from rigidsim.accuracy.motion import Pilot, run_pilot
 from rigidsim.errors import ConfigError
-from rigidsim.model.averaged.applies import reads_rates_alone
+from rigidsim.model.averaged.average import reads_rates_alone
 from rigidsim.model.load import Load
 from rigidsim.scene.choices import FULL
 from rigidsim.scene.config import Experiment

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import rigidsim.model.earth_frames
-import rigidsim.model.invariants
 import rigidsim.model.loads
+import rigidsim.model.observables.mechanical
 import rigidsim.solve.equilibria  # noqa: F401  (each enters what it defines into a registry of rigidsim.scene)
 from rigidsim.errors import ConfigError, Problem, RunFolderError, run_again
 from rigidsim.scene.config import Experiment, Overrides, parse

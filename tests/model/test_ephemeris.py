@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from support import config, run_text
 
-from rigidsim.model.placements.placement import MEAN_DISTANCE, source_position
+from rigidsim.model.placements import MEAN_DISTANCE, source_position
 
 SATELLITE = (
     "principal_moments = [1, 2, 2.5]",

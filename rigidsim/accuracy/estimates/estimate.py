@@ -23,8 +23,7 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.accuracy.error_law import CLOSED_FORM, closed_form_if_any, stable_law
-from rigidsim.model.projected_invariants import projected_invariants
-from rigidsim.model.system import System
+from rigidsim.model.system import System, projected_invariants
 from rigidsim.scene.transitions import acts_at_moments_alone
 from rigidsim.solve.closed_form import ClosedForm
 from rigidsim.solve.compiled import compiled_function, evaluate_rows, interruptible

@@ -4,19 +4,13 @@ from __future__ import annotations
 
 from rigidsim.model import sources  # noqa: F401  (names in expressions)
 from rigidsim.model.load import Load, Term
-from rigidsim.model.loads import (  # noqa: F401  (each enters its kind; a new load is one line more here)
+from rigidsim.model.loads import (  # noqa: F401  (each enters its kinds; a new load is one line more here)
     applied,
-    attraction,
-    elasticity,
-    fluid_core,
+    changing_tensor,
     gravity,
+    inner_bodies,
     magnetic_field,
-    mass_loss,
-    moved_mass,
-    rotor,
     surface_load,
-    uniform_gravity,
-    viscous_torque,
 )
 from rigidsim.model.si import InSI, in_si, seconds
 from rigidsim.model.state_blocks import StateBlock

@@ -18,11 +18,9 @@ from rigidsim.model.harmonics import TurningHarmonics
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Term
 from rigidsim.model.load_words import length_text, value_text
-from rigidsim.model.loads.attraction import Placed
-from rigidsim.model.loads.gravity import CentralGravity, CentralGravityFields
+from rigidsim.model.loads.gravity import CentralGravity, CentralGravityFields, Placed
 from rigidsim.model.names import written
-from rigidsim.model.placements.flight import FlownAbout
-from rigidsim.model.placements.placement import NOWHERE, PlacedOnOrbit, Placement
+from rigidsim.model.placements import NOWHERE, FlownAbout, PlacedOnOrbit, Placement
 from rigidsim.model.rotations import Symbolic, along
 from rigidsim.model.sources import free_flight, in_body_axes, read_in
 from rigidsim.model.two_part import as_factor, rounded

@@ -33,7 +33,7 @@ from rigidsim.model.air_density import AIR_DENSITY, INDICES, LEAST, NRLMSISE, he
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term, loads_of
 from rigidsim.model.loads.applied import Applied
-from rigidsim.model.loads.attraction import Attraction
+from rigidsim.model.loads.gravity import Attraction
 from rigidsim.model.names import written
 from rigidsim.model.plausibility import about_altitude
 from rigidsim.model.rotations import Symbolic, apply

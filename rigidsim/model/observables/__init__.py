@@ -3,15 +3,27 @@
 One module per subject. Importing this package registers the observables in the order of the dataset.
 """
 
-from rigidsim.model.observables import mechanical  # noqa: F401, I001  (enters what it defines)
-from rigidsim.model.observables import axes, rotation, orbit, top, point_masses, parts, climate  # noqa: F401
+from rigidsim.model.observables.axes import AXES, CLIMATE, POLE, ROTATION
+from rigidsim.model.observables.mechanical import MECHANICAL, PARTS, TOP, TOPS, WATCHED
 from rigidsim.model.observables.observable import (
     Angle as Angle,
+)
+from rigidsim.model.observables.observable import (
     Observable as Observable,
+)
+from rigidsim.model.observables.observable import (
     always as always,
+)
+from rigidsim.model.observables.observable import (
     continuous_angles as continuous_angles,
+)
+from rigidsim.model.observables.observable import (
     only_when_named as only_when_named,
+)
+from rigidsim.model.observables.observable import (
     register_all,
 )
+from rigidsim.model.observables.orbit import ORBIT, POINT_MASSES, RESONANT_ANGLE
 
-register_all(orbit.RESONANT_ANGLE)  # the last of the dataset
+register_all(*MECHANICAL, *AXES, *ROTATION, *POLE, *ORBIT, *TOP, *POINT_MASSES, *PARTS, *CLIMATE)
+register_all(RESONANT_ANGLE, *TOPS, *WATCHED)

@@ -11,6 +11,34 @@ decrease. Neither loses digits at any angle.
 The kind decides what is recorded by default: a planet that precesses has directions and their angles; a body
 that turns nearly about its figure axis has polar motion, wobble and a rotation angle; other bodies have
 neither.
+
+**Rotation about the momentum, and Andoyer's variables.** With the reference plane (X', Y', n), the unit
+vector k of the angular momentum G k, and the figure's axes (e1, e2, e3), the attitude is R3(h) R1(I) R3(g)
+R1(J) R3(l) with cos I = k . n = H / G, cos J = k . e3 = L / G (Andoyer 1923; Deprit 1967, Am. J. Phys. 35,
+424). Each angle is the arc tangent of two products that vanish only where it is undefined: h with sin I, l
+with sin J, g with sin I sin J.
+
+The rotation angle is their sum h + g + l, which is defined where they aren't (with -h if the momentum starts
+opposite to n, with -l if it starts opposite to e3, each axis then reversed below): the turn about k from X',
+carried there by the smallest rotation that takes n to k, to e1, carried there by the smallest that takes e3
+to k. For a free body that turns nearly about its figure axis it grows uniformly.
+
+Polar motion is the spin relative to the figure axis, seen from the body: m1 = w1 / w3, m2 = w2 / w3 along the
+figure's equator (Munk & MacDonald 1960, The Rotation of the Earth, eq. 6.1.1; IERS: x_p = m1, y_p = -m2).
+
+**What the climate feels**: precession, climatic precession, insolation. In the plane of the orbit, from X'
+(``rigidsim.model.frames``), the equinox lies where the orbit rises through the equator, and the perihelion at
+the longitude of periapsis, whose node counts from X. Both have one zero, since the smallest rotation that
+takes Z to the plane's normal turns about the node. With the axis' components u and v along X' and Y' the
+equinox is at atan2(-u, v).
+
+The mean insolation of a day at a latitude phi and a longitude of the Sun lambda is (Berger 1978, J. Atmos.
+Sci. 35, 2362)
+
+    W = (S0 / pi) ((1 + e cos nu) / (1 - e^2))^2 (H sin phi sin d + cos phi cos d sin H),
+
+with sin d = sin(obliquity) sin(lambda), cos H = -tan phi tan d (within -1 and 1), and nu = lambda - pi less
+the longitude of perihelion.
 """
 
 from __future__ import annotations
@@ -19,22 +47,27 @@ from collections.abc import Callable, Mapping
 
 import heyoka as hy
 
-from rigidsim.model.frames import reference_plane
+from rigidsim.model.frames import ReferencePlane, initial_normal, initial_plane, orbit_plane, reference_plane
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import (
+    MOMENTUM,
     SPACE,
     Angle,
     Observable,
     continuous_angles,
     described_by,
     only_when_named,
-    register_all,
+    same_unit,
 )
-from rigidsim.model.rotations import Symbolic, apply, unit
+from rigidsim.model.rotations import Symbolic, along, apply, length, unit
 from rigidsim.model.scaling import source_rate
+from rigidsim.scene import attitude
+from rigidsim.scene.arithmetic import apply as apply_numbers
 from rigidsim.scene.arithmetic import apply as multiply
+from rigidsim.scene.arithmetic import apply as turned
 from rigidsim.scene.arithmetic import cross, dot, norm
+from rigidsim.scene.frame import unique_axis
 from rigidsim.scene.space_axes import ECLIPTIC, obliquity, to_equator
 
 AXIS = ("axis",)
@@ -129,7 +162,7 @@ def is_nearly_axial(m: Mechanics) -> bool:
 
 _AT_REST = "unit vector; NaN where the body is at rest"
 
-register_all(
+AXES = (
     Observable(
         "figure_axis", SPACE, "1", "direction of the figure axis", lambda m: unit(m.figure_space),
         frame="space axes", needs=("attitude",), by_default=is_planet,
@@ -184,5 +217,306 @@ register_all(
             "the obliquity is 0 or pi",
             figure=True, plane=True,
         ),
+    ),
+)  # fmt: skip
+
+
+def _andoyer_momenta(m: Mechanics) -> list[Symbolic]:
+    momentum, plane = m.momentum_body, reference_plane(m)
+    figure = along(m.fixed(m.scene.figure.pole), momentum)
+    return [figure, length(momentum), along(plane.normal, m.momentum_space)]
+
+
+def _andoyer_angles(m: Mechanics) -> list[Angle]:
+    figure, plane = m.scene.figure, reference_plane(m)
+    k = unit(m.momentum_body)
+    u, v, s = plane.components(apply(m.matrix, k))
+    # k x e3 from body components: they are small there, so it keeps its digits
+    q0, q1, q2 = plane.components(apply(m.matrix, cross(k, m.fixed(figure.pole))))
+    across = (u * u + v * v) * q2 - s * (u * q0 + v * q1)
+    return [
+        Angle(along(m.fixed(figure.first), k), along(m.fixed(figure.second), k)),
+        Angle(across, u * q1 - v * q0),
+        Angle(u, -v),
+    ]
+
+
+def _senses(m: Mechanics) -> tuple[int, int]:
+    """Side of the reference plane, and of the figure's equator, on which the momentum starts: +1 or -1."""
+    scene = m.scene
+    momentum = m.starting_momentum
+    in_space = apply_numbers(attitude.rotation_matrix(scene.quaternion), momentum)
+    above = dot(in_space, initial_normal(scene, m.loads))
+    return (-1 if above < 0 else 1), (-1 if dot(momentum, scene.figure.pole) < 0 else 1)
+
+
+def _rotation_angle(m: Mechanics) -> list[Angle]:
+    figure, plane = m.scene.figure, reference_plane(m)
+    north, upright = _senses(m)
+
+    def seen(vector: list[Symbolic], sign: int = 1) -> list[Symbolic]:
+        """Components along X', Y', n, or X', -Y', -n for sign -1, so that the momentum's last is positive."""
+        x, y, z = plane.components(vector)
+        signs = (sign, sign * north, sign * north)
+        return [a if s > 0 else -a for a, s in zip((x, y, z), signs, strict=True)]
+
+    u, v, s = seen(unit(m.momentum_space))
+    first = seen(apply(m.matrix, m.fixed(figure.first)))
+    second = seen(apply(m.matrix, m.fixed(figure.second)), upright)
+    inverse = 1.0 / (1.0 + s)
+    x = [1.0 - u * u * inverse, -(u * v * inverse), -u]
+    y = [-(u * v * inverse), 1.0 - v * v * inverse, -v]
+    return [Angle(along(y, first) - along(x, second), along(x, first) + along(y, second))]
+
+
+def _rotation_sum(m: Mechanics) -> str:
+    """The rotation angle as a sum of Andoyer's: h and l count backwards on the momentum's other side."""
+    north, upright = _senses(m)
+    if north > 0 and upright > 0:
+        return "h + g + l"
+    return f"g {'+' if north > 0 else '-'} h {'+' if upright > 0 else '-'} l"
+
+
+ROTATION = (
+    continuous_angles(
+        "rotation_angle", (), "angle of rotation about the angular momentum", _rotation_angle,
+        frame="space axes", needs=("attitude", "plane"), by_default=is_nearly_axial,
+        attributes=described_by(
+            lambda m: f"{_rotation_sum(m)} of andoyer_angles: from X, carried to the momentum's equator by "
+            "the smallest rotations, to the figure's first axis; in the direct sense about the momentum; "
+            "turns counted",
+            figure=True, plane=True,
+        ),
+    ),
+    Observable(
+        "rotation_rate", (), "rad s-1", "instantaneous rate of rotation", lambda m: [length(m.rates)],
+        same_unit(lambda m: -m.scaling.time, 1), by_default=only_when_named,
+        attributes=described_by("norm of the angular velocity"),
+    ),
+    Observable(
+        "rotation_period", (), "s", "instantaneous period of rotation (sidereal length of day)",
+        lambda m: [m.number(2 * m.scene.context.pi) / length(m.rates)],
+        same_unit(lambda m: m.scaling.time, 1), by_default=only_when_named,
+        attributes=described_by("2 pi / rotation_rate, against the stars; infinite at rest"),
+    ),
+    Observable(
+        "andoyer_momenta", ("andoyer_momentum",), "kg m2 s-1", "Andoyer momenta", _andoyer_momenta,
+        same_unit(MOMENTUM, 3), needs=("attitude", "plane"), by_default=only_when_named,
+        attributes=described_by(
+            "L along the figure axis, G the norm, H along the reference plane's normal",
+            figure=True, plane=True,
+        ),
+    ),
+    continuous_angles(
+        "andoyer_angles", ("andoyer_angle",), "Andoyer angles", _andoyer_angles,
+        needs=("attitude", "plane"),
+        attributes=described_by(
+            "l about the figure axis, g about the momentum, h about the reference plane's normal: attitude = "
+            "R3(h) R1(I) R3(g) R1(J) R3(l), cos I = H/G, cos J = L/G; turns counted; NaN where undefined",
+            figure=True, plane=True,
+        ),
+    ),
+)  # fmt: skip
+
+
+# --- relative to the figure axis, seen from the body --------------------------------------------------------
+
+
+def _polar_motion(m: Mechanics) -> list[Symbolic]:
+    figure = m.scene.figure
+    w1, w2, w3 = (along(m.fixed(axis), m.rates) for axis in (figure.first, figure.second, figure.pole))
+    off = hy.gt(w1 * w1 + w2 * w2, w3 * w3)
+    kept = hy.select(off, 0.0, 1.0)
+    kept = kept / kept  # NaN where it is off, and 1 elsewhere
+    return [kept * (w1 / w3), kept * (w2 / w3)]
+
+
+def _no_polar_motion(m: Mechanics) -> str | None:
+    """Why there is no polar motion: the spin starts outside the cone where it is recorded."""
+    context, figure = m.scene.context, m.scene.figure
+    aligned = abs(dot(m.scene.angular_velocity, figure.pole))
+    across = norm(context, [dot(m.scene.angular_velocity, e) for e in (figure.first, figure.second)])
+    if aligned == 0 and across == 0:
+        return "the body starts at rest, without a spin that could have a pole"
+    if across > aligned:
+        degrees = context.nstr(context.degrees(context.atan2(across, aligned)), 4)
+        return (
+            f"the spin starts {degrees} deg from the figure axis ({figure.described}), and polar motion is "
+            "recorded up to 45 deg; choose another [frame] figure_axis, or record wobble_angle"
+        )
+    return None
+
+
+def _angle_between(a: list[Symbolic], b: list[Symbolic]) -> Symbolic:
+    """Angle atan2(|a x b|, a . b), 0 to pi, which loses no digits anywhere; NaN if either vector is zero."""
+    aligned = along(a, b)
+    across = length(cross(a, b))
+    size = hy.sqrt(aligned * aligned + across * across)
+    return hy.atan2(across / size, aligned / size)
+
+
+def _wobble_angle(m: Mechanics) -> list[Symbolic]:
+    largest = unique_axis(m.scene.body, m.scene.context, largest=True)
+    assert largest is not None
+    return [_angle_between(m.fixed(largest), m.momentum_body)]
+
+
+def _no_largest(m: Mechanics) -> str | None:
+    if unique_axis(m.scene.body, m.scene.context, largest=True) is not None:
+        return None
+    return (
+        "the two largest principal moments are equal, so that no single axis has the largest; record "
+        "nutation_angle"
+    )
+
+
+def _polar_attributes(m: Mechanics) -> Mapping[str, str]:
+    first = ", ".join(m.scene.context.nstr(x, 17) for x in m.scene.figure.first)
+    convention = "m1 = w1/w3, m2 = w2/w3 (IERS: x_p = m1, y_p = -m2); NaN where the spin is more than 45 "
+    shown = dict(described_by(convention + "degrees from the figure axis", figure=True)(m))
+    return {"convention": shown["convention"], "first_axis": f"[{first}] in body axes"} | shown
+
+
+_NO_SPIN = "0 to pi; NaN where the body is at rest"
+
+POLE = (
+    Observable(
+        "polar_motion", ("polar_motion_component",), "rad", "polar motion", _polar_motion,
+        frame="body axes", by_default=is_nearly_axial, attributes=_polar_attributes,
+        absent=_no_polar_motion,
+    ),
+    Observable(
+        "wobble_angle", (), "rad", "angle of the angular momentum from the axis of largest moment",
+        _wobble_angle, frame="body axes", by_default=is_nearly_axial,
+        attributes=described_by(_NO_SPIN), absent=_no_largest,
+    ),
+    Observable(
+        "nutation_angle", (), "rad", "angle of the figure axis from the angular momentum",
+        lambda m: [_angle_between(m.fixed(m.scene.figure.pole), m.momentum_body)],
+        frame="body axes", by_default=is_nearly_axial,
+        attributes=described_by(_NO_SPIN, figure=True),
+    ),
+)  # fmt: skip
+
+
+def _source(m: Mechanics) -> Load | None:
+    """The first load whose source is on an orbit of known elements."""
+    return next((load for load in m.loads if load.orbit is not None or load.table is not None), None)
+
+
+def _no_orbit(m: Mechanics) -> str | None:
+    if _source(m) is not None:
+        return None
+    return "no load has an orbit by elements or a table, to which it would refer; leave it out"
+
+
+def _plane(m: Mechanics) -> ReferencePlane:
+    return orbit_plane(m, [m.carried(_source(m))])
+
+
+def _equinox(m: Mechanics) -> tuple[Symbolic, Symbolic]:
+    """Cosine and sine of the equinox's longitude, times the sine of the obliquity."""
+    u, v, _ = _plane(m).components(unit(m.figure_space))
+    return v, -u
+
+
+def _eccentric(m: Mechanics) -> tuple[Symbolic, Symbolic]:
+    load = m.carried(_source(m))
+    states = m.table(load.table) if load.table is not None else m.orbit(m.carried(load.orbit))
+    k, h = m.carried(states.eccentric)
+    return hy.expression(k), hy.expression(h)
+
+
+def _precession(m: Mechanics) -> list[Angle]:
+    """From the equinox of the start, whose cosine and sine are numbers."""
+    scene, (c, s) = m.scene, _equinox(m)
+    axes = initial_plane(scene, m.carried(_source(m)))
+    pole = turned(attitude.rotation_matrix(scene.quaternion), scene.figure.pole)
+    u, v = (dot(axis, pole) for axis in axes[:2])
+    size = scene.context.hypot(u, v)
+    if size == 0:  # no equinox
+        return [Angle(s, c)]
+    begun_c, begun_s = m.number(v / size), m.number(-u / size)
+    return [Angle(begun_c * s - begun_s * c, begun_c * c + begun_s * s)]
+
+
+def _perihelion(m: Mechanics) -> tuple[Symbolic, Symbolic]:
+    """e cos and e sin of the longitude of perihelion from the moving equinox, times sin(obliquity)."""
+    (c, s), (k, h) = _equinox(m), _eccentric(m)
+    return k * c + h * s, h * c - k * s
+
+
+def _climatic(m: Mechanics) -> list[Symbolic]:
+    c, s = _equinox(m)
+    return [_perihelion(m)[1] / hy.sqrt(c * c + s * s)]
+
+
+def _bounded(x: Symbolic) -> Symbolic:
+    """A number within -1 and 1."""
+    return 0.5 * (hy.sqrt((x + 1.0) * (x + 1.0)) - hy.sqrt((x - 1.0) * (x - 1.0)))
+
+
+def _insolation(m: Mechanics) -> list[Symbolic]:
+    table, context = m.scene.config.output.insolation, m.scene.context
+    assert table is not None  # else the variable isn't found
+    (c, s), (k, h) = _equinox(m), _eccentric(m)
+    sine = hy.sqrt(c * c + s * s)  # of the obliquity
+    solar, latitude = table.solar_longitude.at(context), table.latitude.at(context)
+    along, across = (x / sine for x in _perihelion(m))
+    # e cos(nu), with nu = lambda - perihelion - pi
+    nearer = -(m.number(context.cos(solar)) * along + m.number(context.sin(solar)) * across)
+    up = m.number(context.sin(solar)) * sine  # sine of the declination
+    level = hy.sqrt(1.0 - up * up)
+    rise, flat = m.number(context.sin(latitude)) * up, m.number(context.cos(latitude)) * level
+    hour = hy.acos(_bounded(-rise / flat))
+    rest = 1.0 - k * k - h * h
+    ratio = (1.0 + nearer) / rest
+    size = m.number(table.constant.at(context) / context.pi)
+    return [size * (ratio * ratio) * (hour * rise + flat * hy.sin(hour))]
+
+
+def _no_insolation(m: Mechanics) -> str | None:
+    if m.scene.config.output.insolation is None:
+        return "it needs [output] insolation = {latitude, solar_longitude}; add it, or leave it out"
+    return _no_orbit(m)
+
+
+def _attributes(convention: str) -> Callable[[Mechanics], Mapping[str, str]]:
+    return described_by(
+        f"{convention}; in the plane of the orbit of the first source with elements", figure=True
+    )
+
+
+_NEEDS = ("attitude",)
+_PERIHELION = (
+    "elements of the planet about the Sun, as tables of orbital solutions have them, give the usual sign"
+)
+
+CLIMATE = (
+    continuous_angles(
+        "precession", (), "precession of the equinox along the orbit", _precession,
+        needs=_NEEDS, absent=_no_orbit,
+        attributes=_attributes("from the equinox of the start, in the direct sense; turns counted"),
+    ),
+    continuous_angles(
+        "longitude_of_perihelion_of_date", (), "longitude of perihelion from the moving equinox",
+        lambda m: [Angle(*reversed(_perihelion(m)))],
+        needs=_NEEDS, absent=_no_orbit, attributes=_attributes(f"turns counted; {_PERIHELION}"),
+    ),
+    Observable(
+        "climatic_precession", (), "1", "climatic precession", _climatic,
+        needs=_NEEDS, by_default=only_when_named, absent=_no_orbit,
+        attributes=_attributes(f"e sin of longitude_of_perihelion_of_date; {_PERIHELION}"),
+    ),
+    Observable(
+        "orbit_eccentricity", (), "1", "eccentricity of the orbit",
+        lambda m: [hy.sqrt(sum((x * x for x in _eccentric(m)), hy.expression(0.0)))],
+        by_default=only_when_named, absent=_no_orbit,
+        attributes=described_by("of the first source with elements"),
+    ),
+    Observable(
+        "insolation", (), "W m-2", "mean insolation of a day", _insolation,
+        lambda m: [0], needs=_NEEDS, by_default=only_when_named, absent=_no_insolation,
+        attributes=_attributes("at the latitude and the longitude of the Sun that [output] insolation gives"),
     ),
 )  # fmt: skip

@@ -198,7 +198,7 @@ class Observable:
         conserved: why it is an invariant of this scene, or None where it isn't.
         drift_scale: scale of its drift in SI (mpf), and the name of that scale.
         by_default: whether it is recorded if the config names nothing.
-        continuity: how samples are joined, see ``rigidsim.model.outputs.Recorded``.
+        continuity: how samples are joined, see ``rigidsim.model.system.Recorded``.
         angles: the angles whose full turns are counted (``continuous_angles``), if it consists of such.
         poles: for Euler angles that are functions of the state, where only one of the outer ones is defined.
         attributes: further attributes of the variable: convention, reference plane, ...

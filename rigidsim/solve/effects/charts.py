@@ -2,7 +2,7 @@
 
 The chart is changed at the first natural step boundary where its singular factor is below ``NEAR``: a
 function of the state alone, so that bits don't depend on how a run is driven. The other chart's factor is at
-least sqrt(1 - NEAR^2) there (see ``rigidsim.model.formulations.euler_angles``), far from a change back.
+least sqrt(1 - NEAR^2) there (see ``rigidsim.model.formulations.formulation``), far from a change back.
 
 What is recorded stays in the asked sequence: in the partner chart the asked angles are followed from natural
 step to natural step (where they swing fast: in parts of steps), and each sample is joined to what was found
@@ -21,7 +21,7 @@ import heyoka as hy
 import mpmath
 import numpy as np
 
-from rigidsim.model.formulations.euler_angles import (
+from rigidsim.model.formulations.formulation import (
     across,
     partner_sequence,
     pole_of_partner,

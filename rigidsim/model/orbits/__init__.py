@@ -1,1 +1,0 @@
-"""Paths of sources carried as states of the system: Kepler orbits, tables and point masses."""

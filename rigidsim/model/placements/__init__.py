@@ -1,1 +1,0 @@
-"""How distant sources are placed: one class for each way, all of one protocol."""
