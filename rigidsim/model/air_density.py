@@ -130,7 +130,7 @@ def _geodetic(m: Kinematics) -> list[Symbolic]:
         space = [-far * x for x in place.direction]
         rows = earth_axes(m.scene.epoch, m.scene.axes, context)
         x, y, z = (hy.sum([e * a for e, a in zip(m.fixed(row), space, strict=True)]) for row in rows)
-        angle = m.number(context.ldexp(rotation_rate(context), m.scaling.time)) * hy.time
+        angle = m.scaled(rotation_rate(context), m.scaling.time) * hy.time
         c, s = hy.cos(angle), hy.sin(angle)
         m.made[key] = hy.model.cart2geo([c * x + s * y, c * y - s * x, z], R_eq=_EQUATOR)
     return m.made[key]

@@ -200,7 +200,7 @@ class TurningHarmonics:
         """Cosine and sine of the angle by which its axes have turned; None where that doesn't matter."""
         if self.rests:
             return None
-        angle = m.number(m.scene.context.ldexp(self.rate, m.scaling.time)) * hy.time
+        angle = m.scaled(self.rate, m.scaling.time) * hy.time
         return hy.cos(angle), hy.sin(angle)
 
     def _inside(self, m: Kinematics, place: SourcePlace) -> Harmonics:

@@ -325,6 +325,10 @@ class Kinematics:
             offset.append(x - self.number(shift) if shift != 0 else x)
         return offset
 
+    def scaled(self, value: Any, exponent: int) -> Any:
+        """A constant (mpf) times 2^exponent, rounded once."""
+        return self.number(self.scene.context.ldexp(value, exponent))
+
     def fixed(self, vector: Vector) -> list[Symbolic]:
         """A constant vector (mpf) as factors of expressions; exact zeros and ones vanish from products."""
         return [as_factor(self.number(x)) for x in vector]

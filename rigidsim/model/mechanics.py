@@ -252,7 +252,7 @@ class Mechanics(Kinematics):
                     along = hy.sum([self.number(scale * x) * v for x, v in pairs if x != 0])
                     terms.append(expression * along)
         supplied = [found for x in self.carriers if (found := x.supplied_power(self)) is not None]
-        unit = self.number(context.ldexp(context.one, scaling.energy - self.work_unit))
+        unit = self.scaled(1, scaling.energy - self.work_unit)
         terms += [unit * power for power in supplied]
         return hy.sum(terms) if terms else None
 

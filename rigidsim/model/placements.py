@@ -899,13 +899,13 @@ class FlownByKernel(FlownBy):
 
     def away(self, m: Kinematics) -> list[Symbolic]:
         context = m.scene.context
-        unit = m.number(context.ldexp(self.origin.distance(context), -m.scaling.length))
+        unit = m.scaled(self.origin.distance(context), -m.scaling.length)
         source = m.carried(m.sky).seen(self.origin.sight)
         return [x - unit * s for x, s in zip(m.carried(m.position), source, strict=True)]
 
     def velocity(self, m: Kinematics) -> list[Symbolic]:
         context, scaling = m.scene.context, m.scaling
-        unit = m.number(context.ldexp(self.origin.distance(context), -scaling.time - scaling.speed))
+        unit = m.scaled(self.origin.distance(context), -scaling.time - scaling.speed)
         moving = m.carried(m.sky).seen(self.origin.sight, 1)
         return [v - unit * x for v, x in zip(m.carried(m.velocity), moving, strict=True)]
 

@@ -149,7 +149,7 @@ def _times(m: Kinematics, value: Any, exponent: int) -> Any:
         return value
     if isinstance(value, list):
         return [_times(m, x, exponent) for x in value]
-    return m.number(m.scene.context.ldexp(m.scene.context.one, exponent)) * value
+    return m.scaled(1, exponent) * value
 
 
 def _internal(m: Kinematics, value: Any, unit: int, own: Mapping[str, Symbolic]) -> Any:

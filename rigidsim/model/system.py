@@ -556,7 +556,7 @@ def assemble_states(
 def _flight_block(m: Mechanics, plan: ModelPlan) -> StateBlock:
     """x' = v and v' = force over mass, in the units of position and speed."""
     context, scaling = m.scene.context, m.scaling
-    ratio = m.number(context.ldexp(context.one, scaling.speed + scaling.time - scaling.length))
+    ratio = m.scaled(1, scaling.speed + scaling.time - scaling.length)
     accelerations = [hy.sum([m.number(v[i]) * x for v, x in m.force if v[i] != 0]) for i in range(3)]
     initial = [context.ldexp(x, -scaling.length) for x in m.carried(m.scene.position)]
     initial += [context.ldexp(v, -scaling.speed) for v in m.carried(m.scene.velocity)]

@@ -126,7 +126,7 @@ def _growth(m: Mechanics) -> list[Symbolic]:
     names = own_names(m)
     terms = []
     for name, weight in zip(names, _weights(m, names), strict=True):
-        unit = m.number(m.scene.context.ldexp(m.scene.context.one, SMALL + weight))
+        unit = m.scaled(1, SMALL + weight)
         scaled = unit * hy.make_vars(TANGENT + name)
         terms.append(scaled * scaled)
     growth = 0.5 * hy.log(hy.sum(terms))

@@ -181,9 +181,8 @@ class AveragedMechanics(Mechanics):
             return cross(total([pull, *geodetic]), s)
         # the torque acts on the circled axis, which is offset from the momentum by d = -a s x s'; to second
         # order this gives (G - a G^2 + 2 a (s . G s) G) s x s for a pull G s
-        context = self.scene.context
         moment = self.of.motion.transverse / self.of.motion.momentum
-        a = as_factor(self.number(context.ldexp(moment, -self.scaling.time)))
+        a = as_factor(self.scaled(moment, -self.scaling.time))
         factor = 1.0 + 2.0 * (a * dot(s, pull))
         bent = [factor * g - a * again for g, again in zip(pull, self._pull(pull), strict=True)]
         return cross(total([bent, *geodetic]), s)
@@ -263,8 +262,7 @@ class AveragedMechanics(Mechanics):
 
     @cached_property
     def momentum_size(self) -> Any:
-        context = self.scene.context
-        return self.number(context.ldexp(self.of.motion.momentum, -self.scaling.momentum))
+        return self.scaled(self.of.motion.momentum, -self.scaling.momentum)
 
     @cached_property
     def momentum_space(self) -> list[Symbolic]:
@@ -291,8 +289,7 @@ class AveragedMechanics(Mechanics):
     @cached_property
     def rotational_energy(self) -> Symbolic:
         """Energy of the free rotation, a constant."""
-        context = self.scene.context
-        return hy.expression(self.number(context.ldexp(self.of.energy, -self.scaling.energy)))
+        return hy.expression(self.scaled(self.of.energy, -self.scaling.energy))
 
     # --- loads ----------------------------------------------------------------------------------------------
 
@@ -535,9 +532,8 @@ class ResonantMechanics(AveragedMechanics):
     @cached_property
     def _second_torque(self) -> list[Symbolic]:
         """Q along a, b, c: P x dK/dP + T x dK/dT with the axes brought to the momentum, and back."""
-        context = self.scene.context
         k1, k2, k3, k4, k5, k6, k7, k8 = (
-            self.number(context.ldexp(k, -self.scaling.energy)) for k in self.resonance.second_order
+            self.scaled(k, -self.scaling.energy) for k in self.resonance.second_order
         )
         (pa, pb, pc), (ta, tb, tc) = (self._brought(v, 1.0) for v in self.orbit_seen)
         x, c, s = pa * tb - pb * ta, 0.5 * (pa + tb), 0.5 * (pb - ta)
@@ -563,15 +559,15 @@ class ResonantMechanics(AveragedMechanics):
     @cached_property
     def slow_rates(self) -> list[Symbolic]:
         """Angular velocity W of the axes a, b, c, along themselves, per internal unit of time."""
-        context, motion = self.scene.context, self.of.motion
+        motion = self.of.motion
         size, about, m = self.momentum_size, self.about, self.slow_momentum
         inverse = self._inverse_moments
-        pace = self.number(context.ldexp(self.resonance.pace, self.scaling.time))
+        pace = self.scaled(self.resonance.pace, self.scaling.time)
         across = m[0] * m[0] + m[1] * m[1]
         free = [inverse[0] * m[0] - pace * about[0], inverse[1] * m[1] - pace * about[1]]
         # w_c - p n s_c without their common part
         free.append(inverse[2] * hy.make_vars(SLOW[6]) + pace * (across / (size * (size + m[2]))))
-        whole = self.number(context.ldexp(motion.momentum, -self.scaling.momentum))
+        whole = self.scaled(motion.momentum, -self.scaling.momentum)
         parts = [self._secular(x) for x in self.of.sources if x is not self.resonance.source]
         _, bent = self._mean_torque
         driven = cross(about, [q - b for q, b in zip(self._second_torque, bent, strict=True)])

@@ -131,8 +131,7 @@ class MovedMass(Load, Carrier):
 
     def shape(self, m: Kinematics) -> MassDistribution:
         """The tensor of the time, and its derivative along the motion, internal units."""
-        context = m.scene.context
-        unit = m.number(context.ldexp(context.one, -m.scaling.inertia))
+        unit = m.scaled(1, -m.scaling.inertia)
         slopes = {
             name: slope
             for block in own_blocks(m)
@@ -145,7 +144,7 @@ class MovedMass(Load, Carrier):
                 moments.append(unit * written(m, [given])[0])
                 changes.append(_along_motion(moments[-1], slopes))
             else:
-                moments.append(hy.expression(m.number(context.ldexp(given, -m.scaling.inertia))))
+                moments.append(hy.expression(m.scaled(given, -m.scaling.inertia)))
                 changes.append(0.0)
         return MassDistribution(_diagonal(moments), _diagonal(changes))
 

@@ -159,7 +159,7 @@ class Rotor(Load):
         if self.motor is None:
             return None
         context, unit = m.scene.context, self._unit(m)
-        factor = m.number(context.ldexp(context.one, m.scaling.time - unit))
+        factor = m.scaled(1, m.scaling.time - unit)
         start = context.ldexp(self.starting_momentum(m.scene), -unit)
         slope = factor * written(m, [self.motor])[0]
         return StateBlock(
@@ -184,11 +184,11 @@ class Rotor(Load):
 
     def relative_rate(self, m: Kinematics) -> Symbolic:
         """Its rate relative to the body, in units of 1/time."""
-        context, scaling = m.scene.context, m.scaling
+        scaling = m.scaling
         if self.fixed:
-            return hy.expression(m.number(context.ldexp(self.rate, scaling.time)))
+            return hy.expression(m.scaled(self.rate, scaling.time))
         constant, expression = self._momentum(m)
-        own = m.number(context.ldexp(constant / self.moment, scaling.time)) * expression
+        own = m.scaled(constant / self.moment, scaling.time) * expression
         return own - self._about_axis(m)
 
     def _about_axis(self, m: Kinematics) -> Symbolic:
@@ -202,13 +202,13 @@ class Rotor(Load):
         return self.fixed or self.motor is not None
 
     def carried_energy(self, m: Kinematics) -> Symbolic | None:
-        context, scaling = m.scene.context, m.scaling
+        scaling = m.scaling
         if self.fixed:
-            own = m.number(context.ldexp(self.moment * self.rate**2 / 2, -scaling.energy))
-            size = m.number(context.ldexp(self.moment * self.rate, scaling.time - scaling.inertia))
+            own = m.scaled(self.moment * self.rate**2 / 2, -scaling.energy)
+            size = m.scaled(self.moment * self.rate, scaling.time - scaling.inertia)
             return own + size * self._about_axis(m)
         constant, expression = self._momentum(m)
-        size = m.number(context.ldexp(constant**2 / (2 * self.moment), -scaling.energy))
+        size = m.scaled(constant**2 / (2 * self.moment), -scaling.energy)
         return size * expression**2.0
 
     def exerted_torque(self, m: Kinematics) -> list[Term]:
@@ -221,7 +221,7 @@ class Rotor(Load):
         """What the motor does on the body, -torque a . w."""
         if self.motor is None:
             return None
-        size = m.number(m.scene.context.ldexp(m.scene.context.one, -m.scaling.energy))
+        size = m.scaled(1, -m.scaling.energy)
         return -(size * (written(m, [self.motor])[0] * self._about_axis(m)))
 
     def carried_at_start(self, scene: Scene) -> tuple[Vector, Any]:
@@ -420,7 +420,7 @@ class FluidCore(Load):
         rates, relative_rate = self.rates(m), self._relative_rate(m)
         across = cross(rates, relative_rate)
         if self.friction != 0:
-            drag = m.number(context.ldexp(self.friction / (self.polar * (1 - f)), m.scaling.time))
+            drag = m.scaled(self.friction / (self.polar * (1 - f)), m.scaling.time)
             across = [x + drag * d for x, d in zip(across, relative_rate, strict=True)]
         slopes = [[x] for x in across]
         if f != 0:
@@ -430,7 +430,7 @@ class FluidCore(Load):
             ):
                 row += [m.number(-f * p) * along] if p != 0 else []
                 row.append(m.number(f / (1 - f)) * (spin * turned))
-        own = m.number(context.ldexp(context.one, -unit))
+        own = m.scaled(1, -unit)
         derivatives = [hy.sum(row) if unit == 0 else own * hy.sum(row) for row in slopes]
         start = [context.ldexp(x, m.scaling.time - unit) for x in self.at_start(m.scene)]
         exponents = [unit - m.scaling.time] * 3
@@ -465,7 +465,7 @@ class FluidCore(Load):
     def supplied_power(self, m: Kinematics) -> Symbolic | None:
         if self.friction == 0:
             return None
-        drag = m.number(m.scene.context.ldexp(self.friction, -m.scaling.momentum))
+        drag = m.scaled(self.friction, -m.scaling.momentum)
         return -(drag * hy.sum([d * d for d in self._relative_rate(m)]))
 
     def carried_at_start(self, scene: Scene) -> tuple[Vector, Any]:

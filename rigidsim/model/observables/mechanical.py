@@ -214,7 +214,7 @@ def _central(m: Mechanics) -> str | None:
 def total_momentum(m: Mechanics) -> list[Symbolic]:
     """Total angular momentum M r x v + R I w about the (first) attracting point."""
     exponent = m.scaling.length + m.scaling.speed - m.scaling.momentum
-    scale = m.number(m.scene.context.ldexp(m.scene.body.mass, exponent))
+    scale = m.scaled(m.scene.body.mass, exponent)
     orbital = cross(m.offset_from(attracting_point(m)), m.carried(m.velocity))
     return [scale * a + b for a, b in zip(orbital, m.momentum_space, strict=True)]
 
@@ -676,7 +676,7 @@ def _in_frame(m: Mechanics, ratio: int) -> tuple[list[Symbolic], list[Symbolic],
     """Rates and vertical in the top's frame, and k, in internal units."""
     top = m.carried(_top(m, ratio))
     rates, vertical = ([_along(m, axis, v) for axis in top.frame] for v in (m.rates, m.carried(m.vertical)))
-    return rates, vertical, m.number(m.scene.context.ldexp(top.strength / top.axial, 2 * m.scaling.time))
+    return rates, vertical, m.scaled(top.strength / top.axial, 2 * m.scaling.time)
 
 
 def _kovalevskaya(m: Mechanics) -> list[Symbolic]:

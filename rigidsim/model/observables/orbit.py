@@ -211,17 +211,17 @@ _ENERGY, _ANGULAR, _LINEAR = _unit(_energy_scale), _unit(_angular_scale), _unit(
 
 
 def _energy(m: Mechanics) -> list[Symbolic]:
-    context, scaling, masses, unit = m.scene.context, m.scaling, _masses(m), _ENERGY(m)
+    scaling, masses, unit = m.scaling, _masses(m), _ENERGY(m)
     kilograms, states = _kilograms(m), m.carried(m.point_masses)
     terms = []
     for mass, _, velocity, _, _ in _moving(m):
-        half = m.number(context.ldexp(mass / 2, 2 * scaling.speed - unit))
+        half = m.scaled(mass / 2, 2 * scaling.speed - unit)
         terms.append(half * hy.sum([v * v for v in velocity]))
     for (i, j), inverse in states.inverse_distances.items():
         pair = kilograms[i] * masses.strengths[j]
-        terms.append(m.number(context.ldexp(-pair, -scaling.length - unit)) * inverse)
+        terms.append(m.scaled(-pair, -scaling.length - unit) * inverse)
     if masses.full:
-        own = m.number(context.ldexp(context.one, scaling.energy - unit))
+        own = m.scaled(1, scaling.energy - unit)
         terms.append(own * m.rotational_energy)
         terms += [own * m.carried(load.potential(m)) for load in m.acting]
     return [hy.sum(terms)]
@@ -231,7 +231,7 @@ def _angular(m: Mechanics) -> list[Symbolic]:
     scaling, unit = m.scaling, _ANGULAR(m)
     terms = _summed(m, scaling.length + scaling.speed - unit, cross)
     if _masses(m).full:
-        own = m.number(m.scene.context.ldexp(m.scene.context.one, scaling.momentum - unit))
+        own = m.scaled(1, scaling.momentum - unit)
         for found, x in zip(terms, m.momentum_space, strict=True):
             found.append(own * x)
     return [hy.sum(found) for found in terms]
@@ -248,7 +248,7 @@ def _summed(
     """Terms of each component of the sum of masses times a vector of place and velocity."""
     terms: list[list[Symbolic]] = [[], [], []]
     for mass, place, velocity, _, _ in _moving(m):
-        factor = m.number(m.scene.context.ldexp(mass, exponent))
+        factor = m.scaled(mass, exponent)
         for found, x in zip(terms, of(place, velocity), strict=True):
             found.append(factor * x)
     return terms
