@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from rigidsim.look.units import angle_text, clock, scaled, turning_text
 from rigidsim.scene.readable import DAY, named_unit
 
 Curve = Callable[[xarray.Dataset], Plot | None]
+Found = Array | tuple[Array, dict[str, Any]] | None
+"""Columns (rows, n), or one (rows,), and what a dataset says of how they are drawn."""
 
 _TURN = 2 * np.pi
 _ROUND = 1e-6  # relative difference of two moments, below which a body is symmetric
@@ -41,46 +44,56 @@ def recorded(
         if signals.values(dataset, variable) is None:
             return None
         plot = variable_plot(dataset, dataset[variable].transpose("time", ...), "leading")
-        error = uncertain(dataset, plot.values, plot.recorded) if word != "ω" else None
-        return replace(plot, title=title, word=word, labels=labels or plot.labels, error=error, **options)
+        return replace(plot, title=title, word=word, labels=labels or plot.labels, **options)
 
     return found
 
 
 def plotted(
-    dataset: xarray.Dataset, name: str, title: str, table: Array | None, *, of: str = "rad", **options: Any
+    dataset: xarray.Dataset, name: str, title: str, found: Found, *, of: str = "rad", **options: Any
 ) -> Plot | None:
-    """A plot of columns (rows, n), or one (rows,), in the unit that suits them; None of nothing."""
-    if table is None:
+    """A plot of what was found in a dataset, in the unit that suits it; None of nothing. An option `more` is
+    what the title goes on with, and `of` the unit of what was found: empty if it isn't scaled.
+    """
+    if found is None:
         return None
-    table = table.reshape(len(table), -1)
+    table, own = found if isinstance(found, tuple) else (found, {})
+    options = {"name": name, "title": title, "of": of, "word": "angle", **options, **own}
+    of, table = options.pop("of"), table.reshape(len(table), -1)
+    options["title"] += options.pop("more", "")
     divisor, unit = scaled(table, of)
     error = uncertain(dataset, table / divisor, divisor) if of == "rad" else None
-    return Plot(name, title, table / divisor, unit=unit, error=error, **({"word": "angle"} | options))
+    return Plot(values=table / divisor, error=error, **{"unit": unit} | options)
 
 
-def row(name: str, title: str, find: Callable[[xarray.Dataset], Array | None], **options: Any) -> Curve:
+def row(name: str, title: str, find: Callable[[xarray.Dataset], Found], **options: Any) -> Curve:
     """The curves of what is found in a dataset."""
     return lambda dataset: plotted(dataset, name, title, find(dataset), **options)
 
 
-def attitude(dataset: xarray.Dataset) -> Plot | None:
+def attitude(dataset: xarray.Dataset) -> Found:
     """Recorded Euler angles less their fast growth, which would press the others flat, or else the body's z
     axis in space.
     """
-    angles = signals.values(dataset, "euler_angles", 3)
+    angles, wrapped = signals.values(dataset, "euler_angles", 3), "angles_wrapped_from" in dataset.attrs
     if angles is None:
         table, sparse = signals.in_space(dataset, np.eye(3)[2]), signals.aliased(dataset)
         title = "Direction of the body's z axis in space" + (", samples" if sparse else "")
-        options: dict[str, Any] = {"word": "cosine", "hues": XYZ, "begins": True, "sparse": sparse}
-        return None if table is None else Plot("z_axis", title, table, ("Z on X", "on Y", "on Z"), **options)
-    labels, wrapped = ["φ", "θ", "ψ"], "angles_wrapped_from" in dataset.attrs
-    title = "Euler angles" + (" within one turn" if wrapped else "")
+        options = {
+            "name": "z_axis",
+            "title": title,
+            "word": "cosine",
+            "of": "",
+            "sparse": sparse,
+            "hues": XYZ,
+        }
+        return None if table is None else (table, {**options, "labels": ("Z on X", "on Y", "on Z")})
+    labels = ["φ", "θ", "ψ"]
     for k, symbol in enumerate(labels):
         if not wrapped and np.ptp(signals.finite_rows(angles)[:, k]) > 2 * _TURN:
             angles[:, k], line = grown(dataset, angles[:, k])
             labels[k] = symbol + line
-    return plotted(dataset, "euler_angles", title, angles, labels=labels, sparse=wrapped, begins=True)
+    return angles, {"labels": labels, "sparse": wrapped, "more": " within one turn" if wrapped else ""}
 
 
 def grown(dataset: xarray.Dataset, angle: Array) -> tuple[Array, str]:
@@ -94,19 +107,18 @@ def grown(dataset: xarray.Dataset, angle: Array) -> tuple[Array, str]:
 
 def orientations(dataset: xarray.Dataset) -> dict[str, tuple[Array, Array]]:
     """Obliquity and node longitude of the distinguishable axes that are shown together, figure axis first."""
-    found = {name: signals.orientation(dataset, name) for name in _AXES}
-    known = {name: pair for name, pair in found.items() if pair and np.isfinite(pair[0]).any()}
-    if not known:
-        return {}
-    first, (tilt, node) = next(iter(known.items()))
-    reach = max(float(np.nanmax(np.abs(tilt - np.nanmean(tilt)))), 1e-300)
-
-    def distinct(pair: tuple[Array, Array]) -> bool:
+    shown: dict[str, tuple[Array, Array]] = {}
+    for name in _AXES:
+        pair = signals.orientation(dataset, name)
+        if pair is None or not np.isfinite(pair[0]).any():
+            continue
+        tilt, node = next(iter(shown.values()), pair)
+        reach = max(float(np.nanmax(np.abs(tilt - np.nanmean(tilt)))), 1e-300)
         longitude = pair[1] - node  # of half a turn and more: it goes about another pole
         near = float(np.nanmax(longitude) - np.nanmin(longitude)) < np.pi
-        return float(np.nanmax(np.abs(pair[0] - tilt))) > 0.03 * reach and near
-
-    return {name: pair for name, pair in known.items() if name == first or distinct(pair)}
+        if not shown or (near and float(np.nanmax(np.abs(pair[0] - tilt))) > 0.03 * reach):
+            shown[name] = pair
+    return shown
 
 
 def precesses(dataset: xarray.Dataset) -> bool:
@@ -114,133 +126,98 @@ def precesses(dataset: xarray.Dataset) -> bool:
     return bool(orientations(dataset)) and signals.steady_momentum(dataset) is None
 
 
-def _of_axes(dataset: xarray.Dataset, which: int) -> tuple[Array, dict[str, Any]] | None:
-    shown = orientations(dataset)
+def _of_axes(dataset: xarray.Dataset, which: int) -> Found:
+    """Obliquities, less the mean of the first axis shown where that would hide their swings, or longitudes of
+    nodes, less the straight line through the first unless they swing as far about it as without it.
+    """
+    shown, seconds = orientations(dataset), signals.seconds(dataset)
     if not shown:
         return None
-    options: dict[str, Any] = {
-        "labels": [f"{name} axis" for name in shown],
-        "hues": [_AXES[n] for n in shown],
-        "begins": True,
-    }
-    return np.stack([pair[which] for pair in shown.values()], axis=1), options
-
-
-def obliquity(dataset: xarray.Dataset) -> Plot | None:
-    """Obliquities, less the mean of the first axis shown where that would hide their swings."""
-    found = _of_axes(dataset, 0)
-    if found is None:
-        return None
-    (table, options), title, word = found, "Obliquity", "obliquity"
-    if not _legible(table):
-        mean = secular(signals.seconds(dataset), table[:, 0]).value
-        table, word = table - mean, "obliquity − mean"
-        title = f"Obliquity less its mean, {angle_text(mean, 7)}"
-    return plotted(dataset, "obliquity", title, table, word=word, **options)
-
-
-def longitude(dataset: xarray.Dataset) -> Plot | None:
-    """Longitudes of the node, less the straight line through that of the first axis shown unless they swing
-    as far about it as without it.
-    """
-    found = _of_axes(dataset, 1)
-    if found is None:
-        return None
-    (table, options), seconds, unit = found, signals.seconds(dataset), clock(dataset)[1]
+    table = np.stack([pair[which] for pair in shown.values()], axis=1)
+    options = {"labels": [f"{name} axis" for name in shown], "hues": [_AXES[name] for name in shown]}
     trend = secular(seconds, table[:, 0])
-    rest = table - trend.at(seconds)[:, None]
-    title, word = "Longitude of the node", "longitude"
-    if not _legible(table) or np.nanmax(rest) - np.nanmin(rest) < _AS_FAR * (
-        np.nanmax(table) - np.nanmin(table)
-    ):
-        # precession is shown by the year, whatever the axis of time is in
-        per = unit if abs(trend.rate) * DAY > _QUICK else named_unit("yr")
-        rate = f"{trend.about}{angle_text(trend.rate * per.seconds, 3)}/{per.symbol}"
-        table, title, word = rest, f"{title} less its mean motion, {rate}", "longitude − line"
-    return plotted(dataset, "node_longitude", title, table, word=word, **options)
+    rest = table - (trend.at(seconds)[:, None] if which else trend.value)
+    whole, swing = (float(np.nanmax(values) - np.nanmin(values)) for values in (table, rest))
+    if whole >= _LEGIBLE * float(np.nanmax(np.abs(table))) and not (which and swing < _AS_FAR * whole):
+        return table, options
+    # precession is shown by the year, whatever the axis of time is in
+    unit = clock(dataset)[1]
+    per = unit if abs(trend.rate) * DAY > _QUICK else named_unit("yr")
+    rate = f"{trend.about}{angle_text(trend.rate * per.seconds, 3)}/{per.symbol}"
+    said = {"more": f" less its mean motion, {rate}", "word": "longitude − line"}
+    mean = {"more": f" less its mean, {angle_text(trend.value, 7)}", "word": "obliquity − mean"}
+    return rest, options | (said if which else mean)
 
 
-def _legible(table: Array) -> bool:
-    """Whether ticks along angles (rows, n) show their swings with few digits, nothing taken off."""
-    finite = table[np.isfinite(table)]
-    return bool(len(finite) and np.ptp(finite) >= _LEGIBLE * np.abs(finite).max())
-
-
-def braking(dataset: xarray.Dataset) -> Plot | None:
+def braking(dataset: xarray.Dataset) -> Found:
     """Recorded size of the angular momentum and energy that change visibly, as shares of their start."""
     shares = {}
     for name, words in (("angular_momentum_norm", "angular momentum"), ("energy", "energy")):
         table = signals.values(dataset, name)
         if table is not None and np.isfinite(table).all() and table[0] > 0:
-            share = table / table[0]
-            if np.abs(share - 1).max() > _VISIBLE:
-                shares[words] = share
-    table = np.stack([*shares.values()], axis=1) if shares else np.empty(0)
-    options: dict[str, Any] = {"hues": ("violet", "orange"), "word": "share of the start", "from_zero": True}
-    return Plot("braking", "Remaining rotation", table, [*shares], **options) if shares else None
+            shares[words] = table / table[0]
+    shares = {words: share for words, share in shares.items() if np.abs(share - 1).max() > _VISIBLE}
+    return (np.stack([*shares.values()], axis=1), {"labels": [*shares]}) if shares else None
 
 
-def spin_down(dataset: xarray.Dataset) -> Plot | None:
+def spin_down(dataset: xarray.Dataset) -> Found:
     """The size of an angular velocity that falls by decades."""
     table = signals.values(dataset, "angular_velocity", 3)
-    if table is None or not len(size := signals.norms(signals.finite_rows(table))) or not size.min() > 0:
-        return None
-    if np.log10(size[0] / size[-1]) < _DECADES:
-        return None
-    options: dict[str, Any] = {"of": "rad/s", "word": "|ω|", "log": True}
-    return plotted(dataset, "spin", "Size of the angular velocity", signals.norms(table), **options)
+    size = np.zeros(1) if table is None else signals.norms(table)
+    known = size[np.isfinite(size)]
+    falls = len(known) and known.min() > 0 and known[0] > 10**_DECADES * known[-1]
+    return size if falls else None
 
 
-def swings(dataset: xarray.Dataset) -> tuple[Array | None, list[str]]:
+def swings(dataset: xarray.Dataset) -> tuple[Array, dict[str, Any]] | None:
     """Libration angles (rows, 2), rad, less half turns so that they swing about zero, and their names."""
     table = signals.values(dataset, "libration", 2)
     if table is None:
-        return None, []
-    halves = [int(np.round(np.nanmean(column) / np.pi)) for column in table.T]
+        return None
+    halves = np.round(np.nanmean(table, axis=0) / np.pi)
     names = zip(("in the orbit's plane", "out of it"), halves, strict=True)
-    return table - np.pi * np.array(halves), [name + (f" − {180 * k}°" if k else "") for name, k in names]
+    return table - np.pi * halves, {
+        "labels": [name + (f" − {180 * k:.0f}°" if k else "") for name, k in names]
+    }
 
 
-def libration(dataset: xarray.Dataset) -> Plot | None:
-    """The long axis about the direction to the source, in the orbit's plane and out of it."""
-    title, (table, labels) = "Libration: the long axis from the direction to the source", swings(dataset)
-    return plotted(dataset, "libration", title, table, labels=labels, word="libration", begins=True)
-
-
-def regular(dataset: xarray.Dataset) -> Array | None:
+def regular(dataset: xarray.Dataset) -> tuple[Array, dict[str, Any]] | None:
     """Roll, pitch and yaw where roll and yaw are defined: pitch stays away from a right angle."""
     table = signals.values(dataset, "roll_pitch_yaw", 3)
-    return None if table is None or not np.nanmax(np.abs(table[:, 1])) < _STEEP else table
+    defined = table is not None and np.nanmax(np.abs(table[:, 1])) < _STEEP
+    return (table, {"labels": ("roll", "pitch", "yaw")}) if table is not None and defined else None
 
 
-def tilt(dataset: xarray.Dataset) -> Plot | None:
+def tilt(dataset: xarray.Dataset) -> Found:
     """Tilt of a top against the vertical."""
-    angle, title = signals.values(dataset, "tilt"), "Tilt against the vertical"
-    if angle is None and signals.is_top(dataset):
-        direction, title = signals.pole(dataset, "figure"), "Tilt of the figure axis against the vertical"
-        angle = None if direction is None else signals.angle_between(direction, scene_of(dataset).vertical)
-    return plotted(dataset, "tilt", title, angle, word="θ", begins=True)
+    angle = signals.values(dataset, "tilt")
+    direction = signals.pole(dataset, "figure") if angle is None and signals.is_top(dataset) else None
+    if direction is None:
+        return angle
+    title = "Tilt of the figure axis against the vertical"
+    return signals.angle_between(direction, scene_of(dataset).vertical), {"title": title}
 
 
-def precession(dataset: xarray.Dataset) -> Plot | None:
+def precession(dataset: xarray.Dataset) -> Found:
     """Precession angle of a top about the vertical, less its mean motion if it goes round."""
     angle, line = signals.values(dataset, "precession_angle"), ""
-    if angle is not None and np.nanmax(angle) - np.nanmin(angle) > _TURN:
+    if angle is None:
+        return None
+    if np.nanmax(angle) - np.nanmin(angle) > _TURN:
         angle, line = grown(dataset, angle)
-    options: dict[str, Any] = {"hues": ("orange",), "word": "φ", "begins": True}
-    return plotted(dataset, "precession_angle", "Precession" + line, angle, **options)
+    return angle, {"more": line}
 
 
-def nutation_angle(dataset: xarray.Dataset) -> Array | None:
+def nutation_angle(dataset: xarray.Dataset) -> Found:
     """Angle between the figure axis and the momentum."""
-    angle = signals.values(dataset, "nutation_angle")
     direction, along = signals.pole(dataset, "figure"), signals.pole(dataset, "momentum")
-    if angle is None and direction is not None and along is not None:
-        return signals.angle_between(direction, along)
-    return angle
+    angle = signals.values(dataset, "nutation_angle")
+    if angle is not None or direction is None or along is None:
+        return angle
+    return signals.angle_between(direction, along)
 
 
-def wobble_and_spin(dataset: xarray.Dataset) -> Plot | None:
+def wobble_and_spin(dataset: xarray.Dataset) -> Found:
     """Turns of a symmetric body's figure axis about the momentum, which is fixed, and of the body about its
     figure axis, two to one of a thin plate; None where samples are too far apart to count them.
     """
@@ -249,33 +226,26 @@ def wobble_and_spin(dataset: xarray.Dataset) -> Plot | None:
     if scene.moments is None or rates is None or pole is None or along is None:
         return None
     a, b = np.delete(scene.moments, scene.symmetry)
-    first, second = signals.across(along)
     if abs(a - b) > _ROUND * a or not np.abs(pole - along).max() > _ROUND or not signals.joined(pole):
         return None
-    azimuth = np.unwrap(np.arctan2(pole @ second, pole @ first))
+    azimuth = np.unwrap(np.arctan2(*(pole @ way for way in signals.across(along)[::-1])))
     spin = sources.integrated(signals.seconds(dataset), rates @ scene.figure)
     turns = np.abs(np.stack([azimuth - azimuth[0], spin], axis=1)) / _TURN
-    labels = ("wobble: the axis about the momentum", "spin: the body about its axis")
-    title = f"In space: {turns[-1, 0] / turns[-1, 1]:.3f} turns of the wobble to one of the spin"
-    return Plot("wobble_and_spin", title, turns, labels, word="turns")
+    return turns, {"more": f"{turns[-1, 0] / turns[-1, 1]:.3f} turns of the wobble to one of the spin"}
 
 
-def longitude_libration(dataset: xarray.Dataset) -> Array | None:
+def longitude_libration(dataset: xarray.Dataset) -> Found:
     """The physical libration in longitude."""
     found = sources.librations(dataset)
-    return None if found is None else found.longitude
+    return None if found is None else found[0]
 
 
-def latitude_libration(dataset: xarray.Dataset) -> Plot | None:
+def latitude_libration(dataset: xarray.Dataset) -> Found:
     """The physical librations of the figure axis."""
     found = sources.librations(dataset)
-    if found is None or found.inclination is None or found.node is None:
+    if found is None or found[1] is None:
         return None
-    labels = ("inclination less its mean", "node less its mean motion, × sin(inclination)")
-    table, title = np.stack([found.inclination, found.node], axis=1), "Physical librations in latitude"
-    window = _WINDOW * loop_rows(found.inclination)
-    hues = ("orange", "violet")
-    return plotted(dataset, "latitude_libration", title, table, labels=labels, hues=hues, window=window)
+    return found[1], {"window": _WINDOW * loop_rows(found[1][:, 0])}
 
 
 def loop_rows(swing: Array) -> int:
@@ -285,14 +255,10 @@ def loop_rows(swing: Array) -> int:
     return round(2 * _LOOPS * len(swing) / crossings) if crossings > 8 * _LOOPS else 0
 
 
-def pointing(dataset: xarray.Dataset) -> Plot | None:
+def pointing(dataset: xarray.Dataset) -> Found:
     """How far a body axis points away from where the air or the light comes from."""
     found = sources.pointing_angle(dataset)
-    if found is None:
-        return None
-    axis, towards, angle = found
-    title = f"Angle between the body's {axis} axis and {towards}"
-    return plotted(dataset, "pointing", title, angle, begins=True, from_zero=True)
+    return None if found is None else (found[2], {"more": f"{found[0]} axis and {found[1]}"})
 
 
 def locked_longitude(dataset: xarray.Dataset) -> Array | None:
@@ -307,59 +273,49 @@ def locked_longitude(dataset: xarray.Dataset) -> Array | None:
     return longitude - whole if np.abs(np.diff(longitude)).max() < 3 else None
 
 
-def locking(dataset: xarray.Dataset) -> Plot | None:
+def locking(dataset: xarray.Dataset) -> Found:
     """Turns of the body before its source, until it keeps one face to it."""
-    longitude, title = locked_longitude(dataset), "The point under the source, until the rotation is locked"
-    if longitude is None:
-        return None
-    return Plot("locking", title, longitude[:, None] / _TURN, unit="turns", word="longitude")
+    longitude = locked_longitude(dataset)
+    return None if longitude is None else longitude / _TURN
 
 
-def rotor_tilts(dataset: xarray.Dataset) -> Plot | None:
+def _of_rotors(dataset: xarray.Dataset, columns: list[Array]) -> Found:
+    """A column for each rotor; what motors do takes the whole run."""
+    rotors = gyrostats.rotors(dataset)
+    options = {"labels": [r.name for r in rotors], "begins": all(r.drive != "driven" for r in rotors)}
+    return (np.stack(columns, axis=1), options) if columns else None
+
+
+def rotor_tilts(dataset: xarray.Dataset) -> Found:
     """Angles of the rotors' axes from the angular momentum."""
     whole, rotors = gyrostats.momentum(dataset), gyrostats.rotors(dataset)
-    columns = [] if whole is None else [signals.angle_between(whole, rotor.axis) for rotor in rotors]
-    options: dict[str, Any] = {"labels": [rotor.name for rotor in rotors], "begins": _undriven(dataset)}
-    title, table = (
-        "Axes of the rotors, from the angular momentum",
-        np.stack(columns, axis=1) if columns else None,
+    return _of_rotors(
+        dataset, [] if whole is None else [signals.angle_between(whole, r.axis) for r in rotors]
     )
-    return plotted(dataset, "rotor_tilts", title, table, **options)
 
 
-def rotor_rates(dataset: xarray.Dataset) -> Plot | None:
+def rotor_rates(dataset: xarray.Dataset) -> Found:
     """Rates of the rotors relative to the body, if one changes."""
     rotors = gyrostats.rotors(dataset)
-    columns = [rotor.rate for rotor in rotors] if any(rotor.varies for rotor in rotors) else []
-    options: dict[str, Any] = {"labels": [rotor.name for rotor in rotors], "begins": _undriven(dataset)}
-    title, table = "Rates of the rotors, relative to the body", np.stack(columns, axis=1) if columns else None
-    return plotted(dataset, "rotor_rate", title, table, of="rad/s", word="rate", **options)
-
-
-def _undriven(dataset: xarray.Dataset) -> bool:
-    """Whether no motor drives a rotor: what motors do takes the whole run."""
-    return all(rotor.drive != "driven" for rotor in gyrostats.rotors(dataset))
+    return _of_rotors(dataset, [r.rate for r in rotors] if any(r.varies for r in rotors) else [])
 
 
 def _core(dataset: xarray.Dataset) -> tuple[Array, Array] | None:
     """Rates (rows, 3) of a fluid core and of the mantle, body axes."""
-    core, mantle = (
-        signals.values(dataset, name, 3) for name in ("core_angular_velocity", "angular_velocity")
-    )
+    core, mantle = (signals.values(dataset, f"{part}angular_velocity", 3) for part in ("core_", ""))
     return None if core is None or mantle is None else (core, mantle)
 
 
-def core_axis(dataset: xarray.Dataset) -> Plot | None:
+def core_axis(dataset: xarray.Dataset) -> Found:
     """Angle between the axes about which core and mantle turn."""
-    found, title = _core(dataset), "Axis of the core, from the mantle's spin axis"
+    found = _core(dataset)
     if found is None:
         return None
     apart = signals.angle_between(*found)
-    level = bool(np.nanmin(apart) > (1 - _VISIBLE) * np.nanmax(apart))
-    return plotted(dataset, "core_axis", title, apart, hues=("pink",), from_zero=level)
+    return apart, {"from_zero": bool(np.nanmin(apart) > (1 - _VISIBLE) * np.nanmax(apart))}
 
 
-def core_slip(dataset: xarray.Dataset) -> Array | None:
+def core_slip(dataset: xarray.Dataset) -> Found:
     """By how much faster the core turns than the mantle, rad/s; None if that is only rounding."""
     found = _core(dataset)
     if found is None:
@@ -374,32 +330,30 @@ def core_slip(dataset: xarray.Dataset) -> Array | None:
 def own_states(place: int) -> Curve:
     """Those states of ``[[states]]`` that have the unit in some place."""
 
-    def found(dataset: xarray.Dataset) -> Plot | None:
+    def found(dataset: xarray.Dataset) -> Found:
         own = [v for v in dataset.data_vars.values() if v.attrs.get("given_by") == "[[states]]"]
-        units = list(dict.fromkeys(str(v.attrs.get("units", "1")) for v in own))
-        if place >= len(units):
+        units = list(dict.fromkeys(str(v.attrs.get("units", "1")) for v in own))[place : place + 1]
+        shown = [v for v in own if [v.attrs.get("units", "1")] == units]
+        if not shown:
             return None
-        shown = [str(v.name) for v in own if v.attrs.get("units", "1") == units[place]]
-        table = np.stack([np.asarray(dataset[name].values, dtype=np.float64) for name in shown], axis=1)
-        options: dict[str, Any] = {"of": units[place], "labels": shown, "word": "value", "begins": True}
-        title = "Own states" if len(shown) > 1 else f"Own state {shown[0]}"
-        return plotted(dataset, f"own states {place}", title, table, **options)
+        labels = [str(v.name) for v in shown]
+        title = "Own states" if len(shown) > 1 else f"Own state {labels[0]}"
+        table = np.stack([np.asarray(v.values, dtype=np.float64) for v in shown], axis=1)
+        return table, {"title": title, "labels": labels, "of": units[0]}
 
-    return found
+    return row(f"own states {place}", "", found, word="value", begins=True)
 
 
-def published(dataset: xarray.Dataset) -> Plot | None:
+def published(dataset: xarray.Dataset) -> Found:
     """Angles from a published orientation to the attitude, and between the poles."""
-    found = [signals.values(dataset, f"published_{name}") for name in ("angle", "pole_angle")]
-    if found[0] is None or found[1] is None:
+    angle, pole = (signals.values(dataset, f"published_{name}") for name in ("angle", "pole_angle"))
+    if angle is None or pole is None:
         return None
     kernel = dataset["published_angle"].attrs.get("kernel", "a kernel")
-    table = np.column_stack([table.ravel() for table in found if table is not None])
-    title = f"From the published orientation ({kernel})"
-    return plotted(dataset, "published_angle", title, table, labels=("attitude", "pole"))
+    return np.column_stack([angle.ravel(), pole.ravel()]), {"more": f" ({kernel})"}
 
 
-def published_rotation(dataset: xarray.Dataset) -> Array | None:
+def published_rotation(dataset: xarray.Dataset) -> Found:
     """The rotation vector between them, less its mean, which is an offset of the body's axes."""
     table = signals.values(dataset, "published_rotation", 3)
     return None if table is None else table - table.mean(axis=0)
@@ -408,44 +362,86 @@ def published_rotation(dataset: xarray.Dataset) -> Array | None:
 def sensitivity(variable: str, moved: str) -> Curve:
     """Sizes of derivatives by each parameter, for one SI unit of it."""
 
-    def found(dataset: xarray.Dataset) -> Plot | None:
+    def found(dataset: xarray.Dataset) -> Found:
         table = signals.values(dataset, variable)
         if table is None:
             return None
-        attributes = dataset[variable].attrs
-        keys = [str(label) for label in dataset["parameter"].values]
-        units = str(attributes.get("parameter_units", "")).split(", ") + [""] * len(keys)
-        titles = [k if unit in ("1", "") else f"{k} [{unit}]" for k, unit in zip(keys, units, strict=False)]
-        size = np.linalg.norm(table, axis=2)
-        labels = [k if (s > 0).any() else f"{k}: 0 throughout" for k, s in zip(titles, size.T, strict=True)]
+        attributes, size, labels = dataset[variable].attrs, np.linalg.norm(table, axis=2), []
+        units = str(attributes.get("parameter_units", "")).split(", ")
+        for k, key in enumerate(map(str, dataset["parameter"].values)):
+            unit = units[k] if k < len(units) else ""
+            zero = "" if (size[:, k] > 0).any() else ": 0 throughout"
+            labels.append(key + (f" [{unit}]" if unit not in ("1", "") else "") + zero)
         unit = str(attributes.get("units", "1")).replace("rad s-1", "rad/s")
-        title = f"How far the {moved}, per SI unit of"
-        return Plot(variable, title, size, labels, f"{unit} per unit", word="size", log=True)
+        return size, {"labels": labels, "unit": f"{unit} per unit"}
 
-    return found
+    return row(variable, f"How far the {moved}, per SI unit of", found, of="", word="size", log=True)
 
 
 CURVES: dict[str, Curve] = {
     "rates": recorded("angular_velocity", "Angular velocity, body axes", "ω", begins=True),
     "moments": recorded("principal_moments", "Principal moments of inertia", "I", tuple("xyz"), hues=XYZ),
+    "attitude": row("euler_angles", "Euler angles", attitude, begins=True),
+    "obliquity": row("obliquity", "Obliquity", partial(_of_axes, which=0), word="obliquity", begins=True),
+    "longitude": row(
+        "node_longitude", "Longitude of the node", partial(_of_axes, which=1), word="longitude", begins=True
+    ),
+    "braking": row(
+        "braking", "Remaining rotation", braking, of="", word="share of the start", from_zero=True,
+        hues=("violet", "orange"),
+    ),
+    "spin_down": row(
+        "spin", "Size of the angular velocity", spin_down, of="rad/s", word="|ω|", log=True
+    ),
     "polar_motion": row(
         "polar_motion", "Polar motion: the spin axis seen from the figure axis", signals.polar_motion,
         labels=("m₁", "m₂"), word="polar motion", begins=True,
     ),
-    "roll_pitch_yaw": row(
-        "roll_pitch_yaw", "Attitude against the local frame of the orbit", regular,
-        labels=("roll", "pitch", "yaw"), begins=True,
+    "libration": row(
+        "libration", "Libration: the long axis from the direction to the source", swings, word="libration",
+        begins=True,
     ),
+    "roll_pitch_yaw": row(
+        "roll_pitch_yaw", "Attitude against the local frame of the orbit", regular, begins=True
+    ),
+    "tilt": row("tilt", "Tilt against the vertical", tilt, word="θ", begins=True),
+    "precession": row("precession_angle", "Precession", precession, hues=("orange",), word="φ", begins=True),
     "wobble": row(
         "nutation_angle", "Nutation angle: the figure axis from the momentum", nutation_angle, hues=("grey",)
+    ),
+    "wobble_and_spin": row(
+        "wobble_and_spin", "In space: ", wobble_and_spin, of="", word="turns",
+        labels=("wobble: the axis about the momentum", "spin: the body about its axis"),
     ),
     "longitude_libration": row(
         "longitude_libration", "Physical libration in longitude, less the mean rotation", longitude_libration,
         word="longitude",
     ),
+    "latitude_libration": row(
+        "latitude_libration", "Physical librations in latitude", latitude_libration,
+        labels=("inclination less its mean", "node less its mean motion, × sin(inclination)"),
+        hues=("orange", "violet"),
+    ),
+    "pointing": row(
+        "pointing", "Angle between the body's ", pointing, begins=True, from_zero=True
+    ),
+    "locking": row(
+        "locking", "The point under the source, until the rotation is locked", locking, of="", unit="turns",
+        word="longitude",
+    ),
+    "rotor_tilts": row("rotor_tilts", "Axes of the rotors, from the angular momentum", rotor_tilts),
+    "rotor_rates": row(
+        "rotor_rate", "Rates of the rotors, relative to the body", rotor_rates, of="rad/s", word="rate"
+    ),
+    "core_axis": row(
+        "core_axis", "Axis of the core, from the mantle's spin axis", core_axis, hues=("pink",)
+    ),
     "core_slip": row(
         "core_slip", "Rate of the core, less the mantle's", core_slip, of="rad/s", word="difference",
         hues=("violet",),
+    ),
+    "published": row(
+        "published_angle", "From the published orientation", published, labels=("attitude", "pole")
     ),
     "published_rotation": row(
         "published_rotation", "The same about the body's axes, less its mean", published_rotation,
@@ -455,13 +451,6 @@ CURVES: dict[str, Curve] = {
     "sensitivity_rates": sensitivity("angular_velocity_sensitivity", "angular velocity changes"),
     "sensitivity_position": sensitivity("position_sensitivity", "body moves"),
     "drift": drift_plot,
-    **{f"states_{place}": own_states(place) for place in range(3)},
-    **{
-        curve.__name__: curve
-        for curve in (
-            attitude, obliquity, longitude, braking, spin_down, libration, tilt, precession, wobble_and_spin,
-            latitude_libration, pointing, locking, rotor_tilts, rotor_rates, core_axis, published,
-        )
-    },
+    **{name: own_states(place) for place, name in enumerate(STATES)},
 }  # fmt: skip
 """All of them by name."""

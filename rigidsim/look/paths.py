@@ -18,6 +18,8 @@ _TURN = 2 * np.pi
 _SMALL = 0.05  # rad: sines of smaller angles read as angles
 _FAR = 0.5  # rad from its mean motion, up to which a pole's path is as on a plane to a tenth
 _SAME = 0.005  # of a path's reach, within which two are one
+_FLAT = 1e-3  # of a flight's reach: it lies in a plane up to this thickness
+_ELONGATED = 6.0  # length over height, from which a flight has a scale for each
 _SECTION_POINTS = 8  # least number of points for a section to be drawn
 _SECTIONS = ("libration", "polar_motion", "tip", "nadir", "angular_velocity", "euler_angles")
 
@@ -30,6 +32,7 @@ class Path:
         across, up: what the axes count. center: what is at the origin; without, that isn't marked.
         others: further paths by name. ellipse: points of the one that is closest, and words on it.
         sparse: samples are too far apart to be joined. moves: the point moves along time.
+        alike: both scales are equal.
     """
 
     name: str
@@ -44,6 +47,7 @@ class Path:
     ellipse: tuple[Array, str] | None = None
     sparse: bool = False
     moves: bool = True
+    alike: bool = True
 
     @property
     def reach(self) -> float:
@@ -157,10 +161,7 @@ def tip(dataset: xarray.Dataset) -> Path | None:
     if points is None or not signals.is_top(dataset):
         return None
     up = scene_of(dataset).vertical
-    across = np.eye(3)[1 if abs(up[0]) > 0.9 else 0]  # X and Y if Z is up
-    across = across - (across @ up) * up
-    across /= np.linalg.norm(across)
-    plane = np.stack([points @ across, points @ np.cross(up, across)], axis=1)
+    plane = points @ _in_plane(up)
     scale, unit = si_scale(plane, unit) if unit else (1.0, "")
     if what != "Tip" and np.nanmax(np.abs(plane)) < _SMALL:  # components of a unit vector are angles
         scale, unit = angle_scale(plane)
@@ -210,6 +211,43 @@ def herpolhode_plane(dataset: xarray.Dataset) -> Array | None:
     along, rates = signals.steady_momentum(dataset), signals.values(dataset, "angular_velocity", 3)
     turning = None if rates is None or along is None else signals.in_space(dataset, rates)
     return None if turning is None or along is None else turning @ np.stack(signals.across(along), axis=1)
+
+
+def flight(dataset: xarray.Dataset) -> Path | None:
+    """The path of the centre of mass: of a body thrown seen from the side, else in its plane; None if it lies
+    in none.
+    """
+    position, scene = signals.values(dataset, "position", 3), scene_of(dataset)
+    if position is None:
+        return None
+    (scale, unit), up = si_scale(position - position[0], "m"), scene.vertical
+    if scene.gravity is not None and not scene.attractors:
+        level = position - np.outer(position @ up, up)
+        way = level[-1] - level[0]
+        run = (level - level[0]) @ way / (np.linalg.norm(way) or 1.0)
+        points = np.stack([run, position @ up], axis=1)
+        low, high = sorted(np.ptp(points, axis=0))
+        title = f"Path over {span_text(float(np.ptp(signals.seconds(dataset))))}, seen from the side"
+        names = ("horizontal distance", "height")
+        return Path("path", title, points / scale, *names, unit, alike=high < _ELONGATED * low)
+    finite = signals.finite_rows(position)
+    _, spread, ways = np.linalg.svd(finite - finite.mean(axis=0), full_matrices=False)
+    if len(spread) < 3 or spread[1] == 0 or spread[2] > _FLAT * spread[0]:
+        return None
+    normal = ways[2] * np.sign(ways[2, np.abs(ways[2]).argmax()])
+    points, size = position @ _in_plane(normal), float(np.linalg.norm(np.ptp(position, axis=0)))
+    near = any(not any(one["position"]) for one in scene.attractors)
+    center = "origin" if near and signals.norms(points).min() < size else ""
+    names = ("X", "Y") if normal[2] > 1 - 1e-9 else ("across, in the plane",) * 2
+    return Path("path", "Path in its plane", points / scale, *names, unit, center=center)
+
+
+def _in_plane(normal: Array) -> Array:
+    """Two unit vectors across a normal (3,), as columns (3, 2): X and Y where that is Z."""
+    first = np.eye(3)[1 if abs(normal[0]) > 0.9 else 0]
+    first = first - (first @ normal) * normal
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(normal, first)], axis=1)
 
 
 PATHS: dict[str, Find] = {

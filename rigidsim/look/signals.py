@@ -19,6 +19,9 @@ _IN_WORDS = {"energy_balance": "energy less work"}
 _AVERAGED = ("spin_averaged", "orbit_averaged")  # model levels whose datasets have axes but no attitude
 NEAR_AXIS = 0.35  # largest polar motion (rad) shown as such; beyond it, the body tumbles
 _ALIKE_PLANES = 1e-5  # between unit normals of planes that have one name
+_DEFINING = {
+    "momentum": "angular_momentum", "spin": "angular_velocity", "core": "core_angular_velocity"
+}  # fmt: skip
 _STEADY = 1e-6  # a momentum that turns by less is fixed
 _SPREAD = 1e-5  # of the energy, up to which it counts as constant: more than rounding in single precision
 
@@ -172,11 +175,8 @@ def pole(dataset: xarray.Dataset, axis: str) -> Array | None:
         return recorded
     if axis == "figure":
         return in_space(dataset, scene_of(dataset).figure)
-    if axis == "momentum":
-        found = values(dataset, "angular_momentum", 3)
-    else:
-        rates = values(dataset, "core_angular_velocity" if axis == "core" else "angular_velocity", 3)
-        found = None if rates is None else in_space(dataset, rates)
+    found = values(dataset, _DEFINING[axis], 3)
+    found = found if found is None or axis == "momentum" else in_space(dataset, found)
     return None if found is None else found / norms(found)[:, None]
 
 

@@ -10,6 +10,7 @@ motion (it has no second order in theta), and those in latitude are theta and ph
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray
@@ -45,19 +46,24 @@ def sources(dataset: xarray.Dataset) -> list[Source]:
     listed, times = scene_of(dataset).sources, signals.seconds(dataset)
     nadir = signals.values(dataset, "nadir", 3)
     for number, one in enumerate(listed):
-        path = None if nadir is None or len(listed) > 1 else signals.in_space(dataset, nadir)
+        path = None
         if "source_position" in dataset and one.get("kernel") in dataset["source"].values:
             path = np.asarray(dataset["source_position"].sel(source=one["kernel"]).values)
         elif one.get("position") is not None:
             path = np.tile(np.array(one["position"], dtype=float), (len(times), 1))
         elif one.get("orbit"):
             path = kepler_path(one["orbit"], times)
+        elif nadir is not None and len(listed) == 1:
+            path = signals.in_space(dataset, nadir)
         if path is not None:
-            name = str(one.get("ephemeris", one.get("kernel", "source")))
             distance = float(np.nanmean(signals.norms(path) ** 3))
             tide = float(one.get("gravitational_parameter") or 0.0) / distance
-            found.append(Source(f"source{number}", body_of(one), name, path, tide))
+            found.append(Source(f"source{number}", body_of(one), _name_of(one), path, tide))
     return found
+
+
+def _name_of(one: dict[str, Any]) -> str:
+    return str(one.get("ephemeris", one.get("kernel", "source")))
 
 
 def point_masses(dataset: xarray.Dataset) -> list[Source]:
@@ -93,6 +99,14 @@ def orbit_normal(orbit: dict[str, float]) -> Array:
     return np.array([np.sin(tilt) * np.sin(node), -np.sin(tilt) * np.cos(node), np.cos(tilt)])
 
 
+def keeps(ways: Array, cosine: float) -> bool:
+    """Whether unit vectors (rows, 3) have a mean of such a length, and stay within such a cosine from it."""
+    finite = signals.finite_rows(ways)
+    mean = finite.mean(axis=0) if len(finite) else np.zeros(3)
+    size = float(np.linalg.norm(mean))
+    return size > cosine and bool((finite @ mean).min() > cosine * size)
+
+
 @dataclass(frozen=True)
 class Seen:
     """The strongest source of tides: which known body it is, and unit vectors (rows, 3) to it, body axes."""
@@ -108,10 +122,7 @@ class Seen:
 
     def stays(self, rows: slice = slice(None)) -> bool:
         """Whether it stays over one face in these rows."""
-        ways = signals.finite_rows(self.directions[rows])
-        mean = ways.mean(axis=0) if len(ways) else np.zeros(3)
-        size = float(np.linalg.norm(mean))
-        return size > _FACING and bool((ways @ mean).min() > _FACING * size)
+        return keeps(self.directions[rows], _FACING)
 
     def coordinates(self, figure: Array) -> Array:
         """Longitude and latitude (rows, 2), rad, of the point under it; with the figure axis z from body axis
@@ -138,7 +149,7 @@ def seen(dataset: xarray.Dataset) -> Seen | None:
         return Seen(one.body, one.name, ways / signals.norms(ways)[:, None])
     if nadir is None or len(listed) != 1:
         return None
-    return Seen(body_of(listed[0]), str(listed[0].get("ephemeris", listed[0].get("kernel", "source"))), nadir)
+    return Seen(body_of(listed[0]), _name_of(listed[0]), nadir)
 
 
 def toward(dataset: xarray.Dataset) -> Array | None:
@@ -154,52 +165,38 @@ def librates(dataset: xarray.Dataset) -> bool:
     ways = toward(dataset)
     if ways is None:
         return signals.values(dataset, "libration") is not None
-    finite = signals.finite_rows(ways)
-    mean = finite.mean(axis=0) if len(finite) else np.zeros(3)
-    size = float(np.linalg.norm(mean))
-    return size > 0.5 and bool((finite @ mean).min() > 0.5 * size)
+    return keeps(ways, 0.5)
 
 
-@dataclass(frozen=True)
-class Librations:
-    """Angles (rows,), rad: longitude less its mean motion; inclination less its mean, and the node less its
-    mean motion times the inclination's sine, which are None where the figure axis doesn't precess.
+def librations(dataset: xarray.Dataset) -> tuple[Array, Array | None] | None:
+    """Angles, rad, of a body that turns one face to its source: longitude (rows,) less its mean motion; and
+    (rows, 2) inclination less its mean, and the node less its mean motion times the inclination's sine, which
+    are None where the figure axis doesn't precess. None of other bodies.
     """
-
-    longitude: Array
-    inclination: Array | None
-    node: Array | None
-
-
-def librations(dataset: xarray.Dataset) -> Librations | None:
-    """Librations of a dataset; None of a body that doesn't turn one face to its source."""
     scene, seconds = scene_of(dataset), signals.seconds(dataset)
     rates, ways = signals.values(dataset, "angular_velocity", 3), toward(dataset)
-    swing = signals.values(dataset, "libration", 2)
-    if rates is None or scene.moments is None or "quaternion" not in dataset or len(seconds) < 3:
+    swing, quaternion = signals.values(dataset, "libration", 2), signals.values(dataset, "quaternion", 4)
+    if rates is None or scene.moments is None or quaternion is None or len(seconds) < 3:
         return None
     long, figure = scene.axes[scene.moments.argmin()], scene.axes[scene.moments.argmax()]
     cosine = np.zeros(1) if swing is None else np.cos(swing).prod(axis=1)
-    cosine = cosine if ways is None else ways @ long
-    if not np.nanmin(np.abs(cosine)) > _FACING:
+    if not np.nanmin(np.abs(cosine if ways is None else ways @ long)) > _FACING:
         return None
     figure = figure * np.sign(np.nanmean(rates @ figure))
-    matrix = rotation_matrix(np.asarray(dataset["quaternion"].transpose("time", ...).values))
-    pole, first, second = (matrix @ vector for vector in (figure, long, np.cross(figure, long)))
+    pole, first, second = (rotation_matrix(quaternion) @ v for v in (figure, long, np.cross(figure, long)))
     normal, precesses = _normal(pole)
     e1, e2 = signals.across(normal)
-    turned = np.arctan2(first @ e2 - second @ e1, first @ e1 + second @ e2)
     counted = integrated(seconds, rates @ figure)
+    turned = np.arctan2(first @ e2 - second @ e1, first @ e1 + second @ e2)
     longitude = counted + np.unwrap(turned - counted)
-    inclination = node = None
-    if precesses:
-        tilt = np.arctan2(np.hypot(pole @ e1, pole @ e2), pole @ normal)
-        mean = float(tilt.mean())
-        if np.ptp(tilt) < _REGULAR * mean:
-            inclination = tilt - mean
-            line = np.unwrap(np.arctan2(pole @ e1, -(pole @ e2)))
-            node = (line - secular(seconds, line).at(seconds)) * np.sin(mean)
-    return Librations(longitude - secular(seconds, longitude).at(seconds), inclination, node)
+    longitude -= secular(seconds, longitude).at(seconds)
+    tilt = np.arctan2(np.hypot(pole @ e1, pole @ e2), pole @ normal)
+    mean = float(tilt.mean())
+    if not precesses or np.ptp(tilt) >= _REGULAR * mean:
+        return longitude, None
+    line = np.unwrap(np.arctan2(pole @ e1, -(pole @ e2)))
+    node = (line - secular(seconds, line).at(seconds)) * np.sin(mean)
+    return longitude, np.stack([tilt - mean, node], axis=1)
 
 
 def integrated(seconds: Array, rate: Array) -> Array:
@@ -226,8 +223,7 @@ def pointing_angle(dataset: xarray.Dataset) -> tuple[str, str, Array] | None:
         towards = "the direction of " + called(None if one is None else one.body, "source")
     if ways is None or not np.isfinite(ways).any():
         return None
-    ways = ways / signals.norms(ways)[:, None]
-    mean = np.nanmean(ways, axis=0)
+    mean = np.nanmean(ways / signals.norms(ways)[:, None], axis=0)
     k = int(np.abs(mean).argmax())
-    axis = np.eye(3)[k] * (1.0 if mean[k] > 0 else -1.0)
-    return ("" if mean[k] > 0 else "−") + "xyz"[k], towards, signals.angle_between(ways, axis)
+    sign = "" if mean[k] > 0 else "−"
+    return sign + "xyz"[k], towards, signals.angle_between(ways, np.eye(3)[k] * np.sign(mean[k]))

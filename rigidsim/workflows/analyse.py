@@ -131,10 +131,10 @@ def places_of(out: Path, inputs: Iterable[Path], *, force: bool = False) -> Save
 
 def save(analysis: Analysis, places: Saved) -> None:
     """Write dataset and figure, each of which appears only when complete."""
-    from rigidsim.look.figures.spectrum import save_spectrum
+    from rigidsim.look.figures.spectrum import spectrum_figure
 
     dataset = analysis.dataset
     with writing(places.dataset) as temporary:
         dataset.to_netcdf(temporary, engine="h5netcdf")
     with writing(places.figure) as temporary:
-        save_spectrum(dataset, temporary, file_format="png")
+        spectrum_figure(dataset).savefig(temporary, format="png")

@@ -194,9 +194,9 @@ def with_models(dataset: xarray.Dataset, experiment: Experiment) -> xarray.Datas
 
 def save(dataset: xarray.Dataset, folder: Path) -> None:
     """Write dataset and figure, each of which appears only when complete."""
-    from rigidsim.look.figures.work_precision import save_work_precision
+    from rigidsim.look.figures.work_precision import work_precision_figure
 
     with writing(folder / DATASET) as temporary:
         dataset.to_netcdf(temporary, engine="h5netcdf")
     with writing(folder / FIGURE) as temporary:
-        save_work_precision(dataset, temporary)
+        work_precision_figure(dataset).savefig(temporary, format="png")

@@ -12,8 +12,7 @@ from rigidsim.errors import RigidsimError
 from rigidsim.formats.registry import Naming
 from rigidsim.look.figure_names import OVERVIEW, SPECTRUM
 from rigidsim.look.figures import available, check_name, figure_format, save_figure
-from rigidsim.look.figures.spectrum import save_spectrum
-from rigidsim.look.figures.sweeps import drawable, save_sweep_figure
+from rigidsim.look.figures.sweeps import drawable, sweep_figure
 from rigidsim.store.outputs import ANALYSIS, refuse_loss, writing
 from rigidsim.store.run import SavedRun, ShownRun, open_run
 from rigidsim.store.sweeps.folder import SavedSweep, is_sweep, open_sweep
@@ -86,9 +85,9 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None, for_slides: s
                 refuse_loss([target], saved.files)
                 with writing(target) as new:
                     if isinstance(saved, SavedSweep):
-                        save_sweep_figure(dataset, new, None if name == OVERVIEW else name, file_format=kind)
+                        sweep_figure(dataset, None if name == OVERVIEW else name).savefig(new, format=kind)
                     elif name == SPECTRUM:
-                        save_spectrum(analysing.analyse(saved).dataset, new, file_format=kind)
+                        analysing.analyse(saved).figure().savefig(new, format=kind)
                     else:
                         save_figure(dataset, new, name, file_format=kind, slides=for_slides)
             except ValueError as error:

@@ -2,12 +2,12 @@
 
 Importing this package loads matplotlib, so import it only where a figure is drawn; ``look.figure_names``
 has the names of all figures without it. A figure is an entry of ``catalogue.KINDS``: what it needs, and its
-panels (``panels.Panel``: what it finds in a dataset, and how that is drawn).
+panels: what is found in a dataset (a `Plot`, a `Path`, or a function that draws).
 
 | module | holds |
 | --- | --- |
 | `catalogue` | all figures by name, composed of panels to a page, or one of them on a slide |
-| `panels` | curves, paths and what only paper shows as panels |
+| `panels` | curves, paths and what only paper shows as matplotlib draws them |
 | `surfaces` | polhode, Poinsot's motion, the momentum's sphere of a body with rotors |
 | `style` | colours, fonts, the page's heading, keys |
 | `spectrum`, `work_precision`, `sweeps` | figures of `analyse`, `tradeoff` and `sweep` |

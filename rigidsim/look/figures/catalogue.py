@@ -5,11 +5,11 @@ A page has curves over time on the left, planes on the right, and the motion's o
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import xarray
@@ -22,9 +22,9 @@ from matplotlib.gridspec import SubplotSpec
 from matplotlib.text import Text
 
 from rigidsim.look import signals
-from rigidsim.look.curves import STATES
+from rigidsim.look.curves import CURVES, STATES
 from rigidsim.look.figure_names import FIGURES, OVERVIEW, SPECTRUM
-from rigidsim.look.figures.panels import OVER_TIME, PLANES, Panel
+from rigidsim.look.figures.panels import PLANES, Panel, draw
 from rigidsim.look.figures.style import GREY, INK, PALE, STYLE, blank
 from rigidsim.look.pages import leading, numbers
 from rigidsim.look.plots import HUES, Plot, moves, paper, screen
@@ -44,7 +44,8 @@ _WIDE, _NARROW = 12.4, 8.2
 _PLANES_WIDE = 5.2  # width of a plane where only planes stand side by side
 
 
-_Drawn = Sequence[tuple[Panel, Any]]
+Finders = Mapping[str, Callable[[xarray.Dataset], Panel | None]]
+_Found = list[tuple[str, Panel]]
 GROUNDS = ("light", "dark")
 _DARK, _BRIGHT, _GRID = "#14171d", "#f1f3f5", "#2c323c"
 _FADED = "#566071"
@@ -66,31 +67,35 @@ class Shown:
     rows: xarray.Dataset
     start: xarray.Dataset
 
+    @classmethod
+    def of(cls, dataset: xarray.Dataset) -> Self:
+        """Read the rows that a figure draws of a dataset, possibly lazy."""
+        dataset = in_time_order(dataset)
+        parts = [dataset, dataset.isel(time=slice(0, ROWS))]
+        return cls(*(thin(part, ROWS).assign_attrs(dataset.attrs) for part in parts))
 
-def shown_rows(dataset: xarray.Dataset) -> Shown:
-    """Read the rows that a figure draws of a dataset, possibly lazy."""
-    dataset = in_time_order(dataset)
-    rows = start = thin(dataset, ROWS).assign_attrs(dataset.attrs)
-    if dataset.sizes["time"] > rows.sizes["time"]:
-        start = thin(dataset.isel(time=slice(0, ROWS)), ROWS).assign_attrs(dataset.attrs)
-    return Shown(rows, start)
+    def begins(self, name: str, plot: Plot) -> float:
+        """Seconds of the start that a plot shows by itself, `_CYCLES` swings; 0 if the run has few more."""
+        begun = CURVES[name](self.start) if plot.begins else None
+        length, span = (abs(float(x[-1] - x[0])) for x in map(signals.seconds, (self.start, self.rows)))
+        most = 0
+        for column in () if begun is None else begun.values.T:
+            values = column[np.isfinite(column)]
+            if len(values) >= 50 and moves(values):
+                changes = int(np.count_nonzero(np.diff(np.signbit(values - values.mean()))))
+                if changes < _TELLING * len(values):  # else too sparse to separate swings from a pattern
+                    most = max(most, changes)
+        return 2 * _CYCLES * length / most if length > 0 and most / 2 * span / length > _MANY else 0.0
 
-
-def _beginning(shown: Shown, plot: Plot) -> float:
-    """Seconds that hold `_CYCLES` swings of curves of ``shown.start``; 0 if the run has few more."""
-    seconds, whole = signals.seconds(shown.start), signals.seconds(shown.rows)
-    length, span = float(seconds[-1] - seconds[0]), float(whole[-1] - whole[0])
-    most = 0
-    for column in plot.values.T:
-        values = column[np.isfinite(column)]
-        if len(values) < 50 or not moves(values):
-            continue
-        changes = int(np.count_nonzero(np.diff(np.signbit(values - values.mean()))))
-        if changes < _TELLING * len(values):  # else samples too sparse to separate swings from a pattern
-            most = max(most, changes)
-    if length <= 0 or most / 2 * span / length <= _MANY:
-        return 0.0
-    return 2 * _CYCLES * length / most
+    def draw_first(self, axes: Axes, name: str, begins: float) -> None:
+        """Draw a plot over so many seconds of the start, in a unit of time that suits them."""
+        start = self.start.assign_attrs(time_unit=unit_for(begins).symbol)
+        draw(axes, start, CURVES[name](start))
+        for line in axes.get_lines():
+            if line.get_linestyle() == "None":  # few enough now to be distinguished and followed
+                line.set(linestyle="-", linewidth=0.6, markersize=5.0)
+        time, unit, _ = clock(start)
+        axes.set(xlim=(time[0], time[0] + begins / unit.seconds), xlabel=f"time [{unit.symbol}]")
 
 
 def compose(
@@ -99,77 +104,66 @@ def compose(
     """A page of those panels for which there is data: curves over a common time axis, planes beside
     them or side by side, and below these a table of the motion's own numbers, if wanted.
     """
-    over_time = [(OVER_TIME[name], found) for name, found in found_of(OVER_TIME, curves, shown.rows)]
-    beside = [(PLANES[name], found) for name, found in found_of(PLANES, planes, shown.rows)]
-    table = numbers(shown.rows) if facts else []
+    rows, table = shown.rows, numbers(shown.rows) if facts else []
+    left, right = found_of(CURVES, curves, rows), found_of(PLANES, planes, rows)
     with rc_context(STYLE):  # type: ignore[arg-type]
-        if beside and not over_time and not table:
-            figure = blank(shown.rows, max(_PLANES_WIDE * len(beside), 6.4), 5.2)
-            places = figure.subplots(1, len(beside), squeeze=False)[0]
-            for axes, (panel, found) in zip(places, beside, strict=True):
-                panel.draw(axes, shown.rows, found)
+        if right and not left and not table:
+            figure = blank(rows, max(_PLANES_WIDE * len(right), 6.4), 5.2)
+            for axes, (_, panel) in zip(figure.subplots(1, len(right), squeeze=False)[0], right, strict=True):
+                draw(axes, rows, panel)
         else:
-            figure = _two_columns(shown, over_time, beside, table)
+            figure = _two_columns(shown, left, right, table)
         figure.draw_without_rendering()  # the layout finds its sizes in this round and in drawing
     return figure
 
 
-def found_of(
-    panels: Mapping[str, Panel], names: Sequence[str], rows: xarray.Dataset
-) -> list[tuple[str, Any]]:
+def found_of(panels: Finders, names: Sequence[str], rows: xarray.Dataset) -> _Found:
     """Names of those panels that a dataset has something for, with that."""
-    found = ((name, panels[name].find(rows)) for name in names)
-    return [(name, one) for name, one in found if one is not None]
+    return [(name, found) for name in names if (found := panels[name](rows)) is not None]
 
 
-def _two_columns(shown: Shown, curves: _Drawn, planes: _Drawn, table: list[tuple[str, str]]) -> Figure:
-    rows = shown.rows
-    right = bool(planes or table)
+def _two_columns(shown: Shown, curves: _Found, planes: _Found, table: list[tuple[str, str]]) -> Figure:
     below = _FACT * (len(table) + 1) if table else 0.0
-    left_height = _CURVE * len(curves) if len(curves) > 1 else 3.6 * len(curves)
-    height = max(left_height, _PLANE * len(planes) + below, 2.6)
-    both = bool(right and curves)
-    figure = blank(rows, _WIDE if both else _NARROW, height)
+    left = _CURVE * len(curves) if len(curves) > 1 else 3.6 * len(curves)
+    height = max(left, _PLANE * len(planes) + below, 2.6)
+    both = bool(curves and (planes or table))
+    figure = blank(shown.rows, _WIDE if both else _NARROW, height)
     outer = figure.add_gridspec(1, 1 + both, width_ratios=[1.38, 1.0] if both else None)
-    if curves:
-        grid = outer[0].subgridspec(len(curves), 1)
-        for k, (panel, plot) in enumerate(curves):
-            _curve_panel(figure, grid[k], panel, plot, shown, lowest=k == len(curves) - 1)
-    if right:
-        heights = [_PLANE] * len(planes) + ([below] if table else [])
-        spare = height - sum(heights)
-        heights += [spare] if spare > 0.1 else []
-        grid = outer[-1].subgridspec(len(heights), 1, height_ratios=heights)
-        for row, (panel, found) in enumerate(planes):
-            panel.draw(figure.add_subplot(grid[row]), rows, found)
+    grid = outer[0].subgridspec(max(len(curves), 1), 1)
+    for k, (name, panel) in enumerate(curves):
+        assert isinstance(panel, Plot)
+        _curve_panel(figure, grid[k], name, panel, shown, lowest=k == len(curves) - 1)
+    if planes or table:
+        spare = max(height - _PLANE * len(planes) - below, 1e-3)
+        grid = outer[-1].subgridspec(
+            len(planes) + 2, 1, height_ratios=[_PLANE] * len(planes) + [below or 1e-3, spare]
+        )
+        for row, (_, panel) in enumerate(planes):
+            draw(figure.add_subplot(grid[row]), shown.rows, panel)
         if table:
             _table(figure.add_subplot(grid[len(planes)]), table)
     return figure
 
 
 def _curve_panel(
-    figure: Figure, place: SubplotSpec, panel: Panel, plot: Plot, shown: Shown, *, lowest: bool
+    figure: Figure, place: SubplotSpec, name: str, plot: Plot, shown: Shown, *, lowest: bool
 ) -> None:
     """Draw it over the whole run; of more swings than can be seen there as a band between the extremes, with
     the first of them beside it.
     """
-    begins = first_swings(panel, plot, shown)
-    if not begins:
-        axes = figure.add_subplot(place)
-        panel.draw(axes, shown.rows, plot)
-        time_axis(axes, shown.rows, labelled=lowest)
-        return
-    parts = place.subgridspec(1, 2, width_ratios=[1.7, 1.0], wspace=0.03)
-    whole, first = (figure.add_subplot(parts[k]) for k in range(2))
-    panel.draw(whole, shown.rows, plot)
-    _as_band(whole)
-    time_axis(whole, shown.rows, labelled=True)
-    draw_first(first, panel, shown, begins)
-    legend = first.get_legend()
-    if legend is not None:
-        legend.remove()
-    first.set(ylabel="")
-    first.set_title(f"the first {span_text(begins, 2)}", fontweight="normal", color=GREY)
+    begins = shown.begins(name, plot)
+    parts = place.subgridspec(1, 2, width_ratios=[1.7, 1.0], wspace=0.03) if begins else [place]
+    whole = figure.add_subplot(parts[0])
+    draw(whole, shown.rows, plot)
+    time_axis(whole, shown.rows, labelled=lowest or begins > 0)
+    if begins:
+        _as_band(whole)
+        first = figure.add_subplot(parts[1])
+        shown.draw_first(first, name, begins)
+        first.set(ylabel="")
+        first.set_title(f"the first {span_text(begins, 2)}", fontweight="normal", color=GREY)
+        if first.get_legend() is not None:
+            first.get_legend().remove()
 
 
 def time_axis(axes: Axes, dataset: xarray.Dataset, *, labelled: bool) -> None:
@@ -178,25 +172,7 @@ def time_axis(axes: Axes, dataset: xarray.Dataset, *, labelled: bool) -> None:
     if time[0] != time[-1]:
         axes.set_xlim(time[0], time[-1])
     axes.tick_params(labelbottom=labelled)
-    if labelled:
-        axes.set_xlabel(label)
-
-
-def first_swings(panel: Panel, plot: Plot, shown: Shown) -> float:
-    """Seconds of the start that a panel shows by itself; 0 if the whole run can be followed."""
-    start = panel.find(shown.start) if plot.begins else None
-    return 0.0 if start is None else _beginning(shown, start)
-
-
-def draw_first(axes: Axes, panel: Panel, shown: Shown, begins: float) -> None:
-    """Draw a panel over so many seconds of the start, in a unit of time that suits them."""
-    start = shown.start.assign_attrs(time_unit=unit_for(begins).symbol)
-    panel.draw(axes, start, panel.find(start))
-    for line in axes.get_lines():
-        if line.get_linestyle() == "None":  # few enough now to be distinguished and followed
-            line.set(linestyle="-", linewidth=0.6, markersize=5.0)
-    time, unit, _ = clock(start)
-    axes.set(xlim=(time[0], time[0] + begins / unit.seconds), xlabel=f"time [{unit.symbol}]")
+    axes.set_xlabel(label if labelled else "")
 
 
 def _as_band(axes: Axes) -> None:
@@ -223,34 +199,24 @@ def _table(axes: Axes, lines: list[tuple[str, str]]) -> None:
         axes.text(0.56, height, value, color=INK, fontsize=9, va="center", clip_on=False)
 
 
-def slide(shown: Shown, panel: Panel, found: Any, ground: str) -> Figure:
-    """One panel of a run; of many swings over time the first, as they can be followed on a wall.
-
-    Raises:
-        ValueError: a ground that is none of ``GROUNDS``.
-    """
-    if ground not in GROUNDS:
-        raise ValueError(f"--for-slides: given {ground!r}; {' or '.join(GROUNDS)} is allowed")
-    style = {key: _LETTERS * value if _is_size(key) else value for key, value in STYLE.items()}
+def slide(shown: Shown, name: str, panel: Panel, ground: str) -> Figure:
+    """One panel of a run; of many swings over time the first, as they can be followed on a wall."""
+    style = {k: _LETTERS * value if k.endswith(("size", "titlepad")) else value for k, value in STYLE.items()}
     style["lines.linewidth"] = _THICK * STYLE["lines.linewidth"]
     with rc_context(style):  # type: ignore[arg-type]
         figure = blank(shown.rows, *_SLIDE)
         axes = figure.add_subplot()
-        begins = first_swings(panel, found, shown) if isinstance(found, Plot) else 0.0
+        begins = shown.begins(name, panel) if isinstance(panel, Plot) else 0.0
         if begins:
-            draw_first(axes, panel, shown, begins)
+            shown.draw_first(axes, name, begins)
         else:
-            panel.draw(axes, shown.rows, found)
-        if isinstance(found, Plot) and not begins:
-            time_axis(axes, shown.rows, labelled=True)
+            draw(axes, shown.rows, panel)
+            if isinstance(panel, Plot):
+                time_axis(axes, shown.rows, labelled=True)
         if ground == "dark":
             darkened(figure)
         figure.draw_without_rendering()
     return figure
-
-
-def _is_size(key: str) -> bool:
-    return key.endswith(("size", "titlepad"))
 
 
 def darkened(figure: Figure) -> None:
@@ -285,8 +251,12 @@ class Kind:
 
     def shows(self, rows: xarray.Dataset) -> bool:
         """Whether it can be drawn of a dataset (in memory)."""
-        panels, names = (PLANES, self.planes) if self.planes else (OVER_TIME, self.curves)
-        return any(panels[name].find(rows) is not None for name in names)
+        return bool(found_of(*self.leading, rows))
+
+    @property
+    def leading(self) -> tuple[Finders, Sequence[str]]:
+        """What it is named for: planes if it has some, else curves."""
+        return (PLANES, self.planes) if self.planes else (CURVES, self.curves)
 
 
 KINDS: dict[str, Kind] = {
@@ -331,7 +301,7 @@ KINDS: dict[str, Kind] = {
 
 def available(dataset: xarray.Dataset) -> list[str]:
     """The figures that a dataset has something for."""
-    rows = shown_rows(dataset).rows
+    rows = Shown.of(dataset).rows
     return [OVERVIEW, *(name for name, kind in KINDS.items() if kind.shows(rows))]
 
 
@@ -339,10 +309,10 @@ def figure(dataset: xarray.Dataset, what: str = OVERVIEW) -> Figure:
     """A figure of a run by its name in `FIGURES`; of a run of any length, possibly lazy, at most 20,000 rows.
 
     Raises:
-    ValueError: no such figure, none for this dataset, or a dataset without samples.
+        ValueError: no such figure, none for this dataset, or a dataset without samples.
     """
     check_name(what)
-    shown = shown_rows(dataset)
+    shown = Shown.of(dataset)
     if what == OVERVIEW:
         curves, planes = leading(shown.rows)
         return compose(shown, (*curves, "drift"), planes, facts=True)
@@ -360,15 +330,18 @@ def for_slides(dataset: xarray.Dataset, what: str = OVERVIEW, ground: str = "lig
     """The leading panel of a figure of a run, alone and in large letters, on a light or a dark ground.
 
     Raises:
-    ValueError: as for ``figure``, or another ground.
+        ValueError: as for ``figure``, or another ground.
     """
     check_name(what)
-    shown = shown_rows(dataset)
-    kind = KINDS[what] if what in KINDS else Kind("", *(leading(shown.rows) if what == OVERVIEW else ()))
-    groups = [(OVER_TIME, kind.curves), (PLANES, kind.planes)]
+    if ground not in GROUNDS:
+        raise ValueError(f"--for-slides: given {ground!r}; {' or '.join(GROUNDS)} is allowed")
+    shown = Shown.of(dataset)
+    curves, planes = leading(shown.rows) if what == OVERVIEW else ((), ())
+    kind = KINDS.get(what, Kind("", curves, planes))
+    groups = [(CURVES, kind.curves), (PLANES, kind.planes)]
     for panels, names in groups if what == OVERVIEW else reversed(groups):  # first what it is named for
-        for name, found in found_of(panels, names, shown.rows):
-            return slide(shown, panels[name], found, ground)
+        for name, found in found_of(panels, names, shown.rows)[:1]:
+            return slide(shown, name, found, ground)
     raise ValueError(
         f"figure {what!r}: this run has no panel of it for a slide; it has {', '.join(available(dataset))}"
     )
@@ -396,8 +369,7 @@ def save_figure(
         page = for_slides(dataset, what, slides)
         page.savefig(path, dpi=_SLIDE_DOTS, format=file_format, facecolor=page.get_facecolor())
         return path
-    with rc_context(STYLE):  # type: ignore[arg-type]
-        figure(dataset, what).savefig(path, dpi=_DOTS, format=file_format)
+    figure(dataset, what).savefig(path, dpi=_DOTS, format=file_format)
     return path
 
 

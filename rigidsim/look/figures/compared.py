@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from rigidsim.look.figures.style import PALETTE, ShownFigure, save, styled
+from rigidsim.look.figures.style import PALETTE, sheet, styled
 
 _LEAST = 1e-17
 _ERRORS = {"attitude": "rad", "rate": "rad/s", "position": "m"}
@@ -17,7 +15,8 @@ _ERRORS = {"attitude": "rad", "rate": "rad/s", "position": "m"}
 @styled
 def compared_figure(dataset: xarray.Dataset) -> Figure:
     """The figure of a comparison's dataset."""
-    figure = ShownFigure(figsize=(9, 8.2), layout="constrained")
+    verdict = str(dataset.attrs.get("verdict", "")).replace("_", " ")
+    figure = sheet(f"{dataset.attrs.get('title', '')}: {verdict}", 9, 8.2)
     drifts = [str(name) for name in dataset.data_vars if str(name).endswith("_drift")]
     defects = {"defect": "attitude, rad", "rate_defect": "angular velocity, rad/s"}
     panels = {
@@ -37,11 +36,4 @@ def compared_figure(dataset: xarray.Dataset) -> Figure:
         if axes.lines:
             axes.legend(loc="best", ncols=3)
     axes.set_xlabel("time, s")
-    verdict = str(dataset.attrs.get("verdict", "")).replace("_", " ")
-    figure.suptitle(f"{dataset.attrs.get('title', '')}: {verdict}")
     return figure
-
-
-def save_compared(dataset: xarray.Dataset, path: Path, file_format: str = "png") -> Path:
-    """Draw the figure to a file."""
-    return save(compared_figure, dataset, path, file_format)

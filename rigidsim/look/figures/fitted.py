@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import re
 
 import numpy as np
 import xarray
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse
 
 from rigidsim.look.figures.style import (
     BLUE,
@@ -18,11 +16,11 @@ from rigidsim.look.figures.style import (
     ORANGE,
     PALE,
     VIOLET,
-    ShownFigure,
     X,
     Y,
     Z,
-    save,
+    sheet,
+    square,
     styled,
 )  # fmt: skip
 from rigidsim.look.units import angle_scale, scaled
@@ -31,7 +29,6 @@ _MOST_SETS = 4
 _WITHIN_95 = np.sqrt(-2 * np.log(0.05))  # sigmas of an ellipse that holds 95 % of a plane normal distribution
 _COLORS = (X, Y, Z, ORANGE, VIOLET, GREY)
 _MOST_NUMBERS = 12  # parameters whose correlations are written into their cells
-_EDGES = {"parameters": "", "initial": "", "body": ""}
 
 
 @styled
@@ -40,7 +37,8 @@ def fitted_figure(dataset: xarray.Dataset) -> Figure:
     sets = [n for n in range(1, 1 + _MOST_SETS) if f"residual_{n}" in dataset]
     bands = [name for name in ("attitude", "angular_velocity") if f"{name}_sigma" in dataset]
     rows = len(sets) + len(bands)
-    figure = ShownFigure(figsize=(12.5, max(6.0, 2.1 * rows + 0.8)), layout="constrained")
+    title = f"{dataset.attrs.get('title', '')}: {dataset.attrs.get('sentence', '')}"
+    figure = sheet(title, 12.5, max(6.0, 2.1 * rows + 0.8))
     left, right = np.ravel(figure.subfigures(1, 2, width_ratios=[1.3, 1], squeeze=False))
     length, unit = scaled(_observed(dataset) - _observed(dataset).min(), "s", dataset.attrs)
     panels = left.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
@@ -54,14 +52,7 @@ def fitted_figure(dataset: xarray.Dataset) -> Figure:
     _correlations(beside[0], dataset)
     if pole:
         _pole(beside[1], dataset, unit, length)
-    title = f"{dataset.attrs.get('title', '')}: {dataset.attrs.get('sentence', '')}"
-    figure.suptitle(title, x=0.01, ha="left", fontsize=12.5, fontweight="bold", color=INK)
     return figure
-
-
-def save_fitted(dataset: xarray.Dataset, path: Path, file_format: str = "png") -> Path:
-    """Draw the figure to a file."""
-    return save(fitted_figure, dataset, path, file_format)
 
 
 def _observed(dataset: xarray.Dataset) -> np.ndarray:
@@ -126,88 +117,57 @@ def _above(axes: Axes, count: int) -> None:
 
 
 def _correlations(axes: Axes, dataset: xarray.Dataset) -> None:
-    names = [_short(str(x)) for x in dataset["parameter"].values]
+    names = [re.sub(r"^(parameters|initial|body)\.", "", str(x)) for x in dataset["parameter"].values]
     values = dataset["correlation"].values
     image = axes.imshow(values, cmap="RdBu_r", vmin=-1, vmax=1)
     axes.set_facecolor(PALE)
     axes.grid(visible=False)
     axes.set_xticks(range(len(names)), names, rotation=40, ha="right")
     axes.set_yticks(range(len(names)), names)
-    if len(names) <= _MOST_NUMBERS:
-        for i, row in enumerate(values):
-            for j, value in enumerate(row):
-                text = (
-                    "?" if not np.isfinite(value) else f"{value:.2f}".replace("-0.", "-.").replace("0.", ".")
-                )
-                color = "white" if abs(value) > 0.6 else INK
-                axes.text(j, i, text, ha="center", va="center", fontsize=7, color=color)
+    for (i, j), value in np.ndenumerate(values) if len(names) <= _MOST_NUMBERS else ():
+        text = f"{value:.2f}".replace("-0.", "-.").replace("0.", ".") if np.isfinite(value) else "?"
+        color = "white" if abs(value) > 0.6 else INK
+        axes.text(j, i, text, ha="center", va="center", fontsize=7, color=color)
     unknown = " (? undetermined)" if not np.isfinite(values).all() else ""
     axes.set_title(f"correlations{unknown}")
     axes.figure.colorbar(image, ax=axes, shrink=0.7)
-
-
-def _short(key: str) -> str:
-    """A key without the name of its table."""
-    table, dot, rest = key.partition(".")
-    return rest if dot and table in _EDGES else key
 
 
 def _pole(axes: Axes, dataset: xarray.Dataset, unit: str, length: float) -> None:
     """Ellipses of the figure axis, about where it is predicted, seen from outside: the first and last
     observation, and where it is known best.
     """
-    axis, covariances = dataset["figure_axis"].values, dataset["attitude_covariance"].values
-    times = dataset["time"].values
-    observed = _observed(dataset)
-    tangents = [_tangent(a, c) for a, c in zip(axis, covariances, strict=True)]
-    sizes = np.array([np.trace(x) for x in tangents])
-    if not np.isfinite(sizes).any():
-        axes.set_axis_off()
-        axes.set_title("pole: unbounded, by undetermined parameters")
-        return
-    inside = (times >= observed.min()) & (times <= observed.max())
-    best = int(np.nanargmin(np.where(inside, sizes, np.inf))) if inside.any() else int(np.nanargmin(sizes))
+    times, observed = dataset["time"].values, _observed(dataset)
+    tangents = _across(dataset["figure_axis"].values, dataset["attitude_covariance"].values)
+    sizes = np.trace(tangents, axis1=1, axis2=2)
+    inside = (times >= observed.min()) & (times <= observed.max()) & np.isfinite(sizes)
     first, last = (int(np.argmin(np.abs(times - t))) for t in (observed.min(), observed.max()))
+    best = int(np.argmin(np.where(inside, sizes, np.inf))) if inside.any() else first
+    if not sizes[[first, last, best]].max() > 0:
+        axes.set_axis_off()
+        unbounded = not np.isfinite(sizes).any()
+        why = "unbounded, by undetermined parameters" if unbounded else "none of the parameters moves it"
+        axes.set_title(f"pole: {why}")
+        return
     divisor, name = angle_scale(np.sqrt(sizes[[first, best, last]]))
-    reach = 0.0
+    turn = np.linspace(0, 2 * np.pi, 181)
+    circle, drawn = np.stack([np.cos(turn), np.sin(turn)], axis=1) / divisor, []
     for index, color in {first: ORANGE, last: BLUE, best: Y}.items():
         values, vectors = np.linalg.eigh(tangents[index])
-        angle = float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1])))
-        wide, narrow = (np.sqrt(max(x, 0.0)) / divisor for x in values[::-1])
-        label = f"at {times[index] / length:.4g} {unit}"
-        for scale, alpha, line in ((1.0, 0.30, 0.0), (_WITHIN_95, 0.0, 1.2)):
-            axes.add_patch(
-                Ellipse(
-                    (0, 0),
-                    2 * scale * wide,
-                    2 * scale * narrow,
-                    angle=angle,
-                    facecolor=(*to_rgb(color), alpha),
-                    edgecolor=color if line else "none",
-                    linewidth=line,
-                    label=label if line else None,
-                )
-            )
-        reach = max(reach, _WITHIN_95 * wide)
-    if not reach:
-        axes.set_axis_off()
-        axes.set_title("pole: none of the parameters moves it")
-        return
-    axes.axhline(0, color=PALE, linewidth=0.8)
-    axes.axvline(0, color=PALE, linewidth=0.8)
-    axes.set_xlim(-1.3 * reach, 1.3 * reach)
-    axes.set_ylim(-1.3 * reach, 1.3 * reach)
-    axes.set_aspect("equal")
-    axes.set_xlabel(f"east of the predicted pole, {name}")
-    axes.set_ylabel(f"north, {name}")
+        ring = circle * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
+        axes.fill(*ring.T, color=color, alpha=0.3, linewidth=0)
+        drawn.append(_WITHIN_95 * ring)
+        axes.plot(*drawn[-1].T, color=color, linewidth=1.2, label=f"at {times[index] / length:.4g} {unit}")
+    square(axes, *np.vstack(drawn).T)
+    axes.set(xlabel=f"east of the predicted pole, {name}", ylabel=f"north, {name}")
     axes.set_title("pole: 1 sigma filled, 95 % outlined")
     axes.legend(loc="upper right")
 
 
-def _tangent(axis: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """Covariance (2, 2), rad^2, of a direction by the attitude's covariance, east and north about space Z."""
+def _across(axis: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """Covariances (rows, 2, 2), rad^2, of directions (rows, 3) by the attitude's, east and north about Z."""
     east = np.cross([0.0, 0.0, 1.0], axis)
-    east = np.array([0.0, 1.0, 0.0]) if np.linalg.norm(east) < 1e-9 else east / np.linalg.norm(east)
-    north = np.cross(axis, east)
-    moved = np.stack([np.cross(axis, east), np.cross(axis, north)])  # (turn x axis).east = turn.(axis x east)
-    return np.asarray(moved @ covariance @ moved.T)
+    size = np.linalg.norm(east, axis=1, keepdims=True)
+    east = np.where(size < 1e-9, [0.0, 1.0, 0.0], east / np.maximum(size, 1e-300))
+    moved = np.stack([np.cross(axis, east), -east], axis=1)  # (turn x axis).east = turn.(axis x east)
+    return np.asarray(moved @ covariance @ moved.swapaxes(1, 2))

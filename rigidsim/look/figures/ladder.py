@@ -1,28 +1,24 @@
 """The ladder of a scene's physics: what each effect is worth, and error against cost of the models tried."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rigidsim.look.figures.style import BLUE, GREY, INK, ORANGE, PALE, ShownFigure, save
+from rigidsim.look.figures.style import BLUE, GREY, INK, ORANGE, PALE, sheet, styled
 
 _LEAST = 1e-12  # arcsec: below, nothing is seen
 
 
-def save_ladder(plan: Mapping[str, Any], path: Path) -> Path:
-    """Draw the values of a ``PhysicsPlan`` as a page (PNG)."""
-    return save(_ladder, plan, path)
-
-
-def _ladder(plan: Mapping[str, Any]) -> Figure:
-    figure = ShownFigure(figsize=(12, max(4.2, 1.8 + 0.3 * len(plan["effects"]))), layout="constrained")
+@styled
+def ladder_figure(plan: Mapping[str, Any]) -> Figure:
+    """The figure of the values of a ``PhysicsPlan``."""
+    title = f"{plan['name']}: what the scene requires within {plan['error_arcsec']:.4g} arcsec"
+    figure = sheet(title, 12, max(4.2, 1.8 + 0.3 * len(plan["effects"])))
     left, right = figure.subplots(1, 2, width_ratios=(1.1, 1))
     _worths(left, plan)
     _models(right, plan)
-    figure.suptitle(f"{plan['name']}: what the scene requires within {plan['error_arcsec']:.4g} arcsec")
     return figure
 
 

@@ -4,10 +4,9 @@ import io
 import itertools
 import re
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import wraps
-from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec
 
 import numpy as np
 import xarray
@@ -22,9 +21,10 @@ from matplotlib.ticker import MaxNLocator
 from rigidsim.look.plots import HUES, XYZ
 from rigidsim.look.plots import PALETTE as NAMES
 from rigidsim.look.record import read_config
-from rigidsim.look.signals import joined, title_of
+from rigidsim.look.signals import finite_rows, joined, title_of
 from rigidsim.look.solids import Array
 
+P = ParamSpec("P")
 PALETTE = tuple(HUES[name][0] for name in NAMES)
 X, Y, Z = (HUES[name][0] for name in XYZ)
 BLUE, ORANGE, VIOLET, PINK, GREY = (HUES[n][0] for n in ("blue", "orange", "violet", "pink", "grey"))
@@ -73,11 +73,16 @@ STYLE: dict[str, Any] = {
 
 
 class ShownFigure(Figure):
-    """A figure on the Agg canvas that a notebook shows by itself, with or without pyplot."""
+    """A figure on the Agg canvas that is saved in the style, and that a notebook shows by itself."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
         FigureCanvasAgg(self)
+
+    def savefig(self, *args: Any, **options: Any) -> None:
+        """As of matplotlib, in the style."""
+        with rc_context(STYLE):  # type: ignore[arg-type]
+            super().savefig(*args, **{"dpi": 140} | options)
 
     def _repr_png_(self) -> bytes:
         """PNG picture, which IPython asks for."""
@@ -86,22 +91,22 @@ class ShownFigure(Figure):
         return data.getvalue()
 
 
-def styled(draw: Callable[[Any], Figure]) -> Callable[[Any], Figure]:
+def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     """A drawing function whose figures have the style."""
 
     @wraps(draw)
-    def drawn(data: Any) -> Figure:
+    def drawn(*args: P.args, **options: P.kwargs) -> Figure:
         with rc_context(STYLE):  # type: ignore[arg-type]
-            return draw(data)
+            return draw(*args, **options)
 
     return drawn
 
 
-def save(draw: Callable[[Any], Figure], data: Any, path: Path, file_format: str | None = "png") -> Path:
-    """Draw a figure of something to a file, whose path is returned."""
-    with rc_context(STYLE):  # type: ignore[arg-type]
-        draw(data).savefig(path, dpi=140, format=file_format)
-    return path
+def sheet(title: str, width: float, height: float) -> ShownFigure:
+    """An empty page (inches) below a title."""
+    figure = ShownFigure(figsize=(width, height), layout="constrained")
+    figure.suptitle(title, x=0.01, ha="left", fontsize=12.5, fontweight="bold", color=INK)
+    return figure
 
 
 def blank(dataset: xarray.Dataset, width: float, height: float) -> Figure:
@@ -114,17 +119,14 @@ def blank(dataset: xarray.Dataset, width: float, height: float) -> Figure:
     whole = height + top
     engine = ConstrainedLayoutEngine(h_pad=0.09, w_pad=0.09, rect=(0.0, 0.0, 1.0, 1.0 - top / whole))
     figure = ShownFigure(figsize=(width, whole), layout=engine)
-    heading: list[tuple[str, float, dict[str, Any]]] = [
-        (title, 0.12, {"fontsize": 13.5, "fontweight": "bold", "color": INK})
-    ]
-    heading += [(description, _HEADING[0] + 0.07, {"fontsize": 10, "color": GREY})] if description else []
-    for words, down, style in heading:
+    for words, down, style in (
+        (title, 0.12, {"fontsize": 13.5, "fontweight": "bold", "color": INK}),
+        (description, _HEADING[0] + 0.07, {"fontsize": 10, "color": GREY}),
+    ):
         text = figure.text(0.14 / width, 1 - down / whole, words, va="top", gid="heading", **style)
-        room = (width - 0.28) * figure.dpi
-        characters = len(words)
-        while characters > 12 and text.get_window_extent().width > room:
-            characters = min(characters - 2, int(characters * room / text.get_window_extent().width) + 1)
-            text.set_text(textwrap.shorten(words, characters, placeholder=" …") or words[:characters] + "…")
+        share = (width - 0.28) * figure.dpi / max(text.get_window_extent().width, 1.0)
+        if share < 1:
+            text.set_text(textwrap.shorten(words, int(0.97 * share * len(words)), placeholder=" …"))
     return figure
 
 
@@ -134,10 +136,9 @@ def titled(axes: Axes, title: str, *, rows: int = 0) -> None:
     axes.set_title(text, pad=7.0 + (3.0 + rows * _KEY_ROW * _larger() if rows else 0.0))
 
 
-def key(axes: Axes, title: str, *, handles: Sequence[Any] | None = None) -> None:
-    """Set the title, and between it and the panel the key to all curves with a label, or to other handles."""
-    found = list(handles) if handles is not None else axes.get_legend_handles_labels()[0]
-    labels = [str(handle.get_label()) for handle in found]
+def key(axes: Axes, title: str) -> None:
+    """Set the title, and between it and the panel the key to all that has a label."""
+    found, labels = axes.get_legend_handles_labels()
     if not found:
         titled(axes, title)
         return
@@ -227,16 +228,12 @@ def _first_turns(points: Array) -> tuple[int, str]:
 
 def square(axes: Axes, x: Array, y: Array) -> None:
     """Equal scales on both axes, about all finite points (x, y)."""
-    ends = []
-    for values in (x, y):
-        finite = values[np.isfinite(values)]
-        ends.append((float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0))
-    reach = max(high - low for low, high in ends) / 2
-    middle = [(low + high) / 2 for low, high in ends]
-    size = max(map(abs, middle), default=0.0)
-    reach = (max(reach, 1e-12 * size) or 1.0) * (1 + 2 * _MARGIN)
-    axes.set_xlim(middle[0] - reach, middle[0] + reach)
-    axes.set_ylim(middle[1] - reach, middle[1] + reach)
+    points = finite_rows(np.stack([x, y], axis=1))
+    low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(2), np.ones(2))
+    middle = (low + high) / 2
+    reach = max((high - low).max() / 2, 1e-12 * np.abs(middle).max()) or 1.0
+    low, high = (middle + sign * (1 + 2 * _MARGIN) * reach for sign in (-1, 1))
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.set_aspect("equal", adjustable="box")
     axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.yaxis.set_major_locator(MaxNLocator(5))

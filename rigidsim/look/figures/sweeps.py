@@ -6,18 +6,18 @@ axes than two, the others are cut at their first value, and the page says so.
 """
 
 import math
+import re
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
 import numpy as np
 import xarray
-from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm
+from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from rigidsim.look.figures.style import GREY, INK, PALE, PALETTE, STYLE, blank, key, titled
+from rigidsim.look.figures.style import GREY, INK, PALE, PALETTE, blank, key, styled, titled
 from rigidsim.look.record import read_config
 from rigidsim.look.solids import Array
 from rigidsim.look.units import pretty_unit, scaled, with_unit
@@ -43,61 +43,63 @@ _DECADES = 1.5  # from which on values of one sign have a logarithmic scale
 _FEWEST = 12  # directions that make a map
 _MOST_PANELS, _COLUMNS, _PANEL = 14, 2, 1.75  # of fits; inches high
 _APART = 0.012  # of the axis, between members of different colours
+_BAR: dict[str, Any] = {"pad": 0.02, "aspect": 30}
 
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis of the members: places (n,) of its values, its label, texts of the values where they are only
-    numbered, and whether neighbours are related, which randomly drawn members aren't.
+    """An axis of the members: places (n,) of its values, its label, texts of the values, whether these stand
+    at the ticks, whether neighbours are related, which randomly drawn members aren't, and unit vectors (n, 3)
+    of directions.
     """
 
     dim: str
     place: Array
     label: str
     texts: list[str]
-    numbered: bool
-    ordered: bool
-    directions: Array | None
+    ticks: bool = False
+    ordered: bool = False
+    directions: Array | None = None
 
     @classmethod
     def of(cls, dataset: xarray.Dataset, dim: str) -> "Axis":
         """The axis of a dimension."""
         words, count = dim.replace("_", " "), dataset.sizes[dim]
-        values = next((dataset[name] for name in (f"{dim}_value", dim) if name in dataset.coords), None)
+        own = [dataset[name] for name in (f"{dim}_value", dim) if name in dataset.coords][:1]
         zipped = [c for c in dataset.coords.values() if c.dims == (dim,) and "swept_key" in c.attrs]
-        numbers = [c for c in (values, *zipped) if c is not None and c.ndim == 1 and c.dtype.kind in "fi"]
-        texts = [] if values is None else [_text(value) for value in values.values]
-        directions = None
-        if values is not None and values.shape[1:] == (3,) and count >= _FEWEST:
-            lengths = np.linalg.norm(values.values, axis=1)
+        for one in (*own, *zipped):
+            if one.ndim == 1 and one.dtype.kind in "fi":
+                divisor, unit = _unit_of(dataset, one)
+                place = np.asarray(one.values, dtype=np.float64) / divisor
+                ordered = str(one.name) == dim or len(set(np.diff(place) > 0)) < 2
+                return cls(
+                    dim, place, _named(one, unit), [f"{words} {x:.4g}" for x in place], ordered=ordered
+                )
+        place, texts = np.arange(float(count)), [f"{words} {n}" for n in range(count)]
+        if not own:
+            return cls(dim, place, f"{words}, counted from 0", texts)
+        values, directions = own[0].values, None
+        if values.shape[1:] == (3,) and count >= _FEWEST:
+            lengths = np.linalg.norm(values, axis=1)
             if lengths.min() > 0 and np.ptp(lengths) <= _STILL * lengths.max():
-                directions = values.values / lengths[:, None]
-        if not numbers:
-            shown = values is not None and count <= _MOST_SHOWN
-            label = _named(values) if shown and values is not None else f"{words}, counted from 0"
-            return cls(dim, np.arange(float(count)), label, texts, True, False, directions)
-        divisor, unit = _unit_of(dataset, numbers[0])
-        place = np.asarray(numbers[0].values, dtype=np.float64) / divisor
-        rises = np.diff(place) > 0
-        along = str(numbers[0].name) == dim or bool(rises.all() or not rises.any())
-        texts = [f"{words} {x:.4g}" for x in place]
-        return cls(dim, place, _named(numbers[0], unit), texts, False, along, directions)
+                directions = values / lengths[:, None]
+        few = count <= _MOST_SHOWN
+        label = _named(own[0]) if few else f"{words}, counted from 0"
+        return cls(dim, place, label, [_text(value) for value in values], few, directions=directions)
 
     @property
     def log(self) -> bool:
         """Whether its values span decades at equal ratios."""
-        if self.numbered or not spans_decades(self.place):
-            return False
-        ratios = np.diff(np.log(np.unique(self.place)))
-        return len(ratios) < 2 or float(np.ptp(ratios)) < 0.01 * float(ratios.mean())
+        ratios = np.diff(np.log(np.unique(self.place))) if spans_decades(self.place) else np.zeros(0)
+        return len(ratios) > 0 and not self.ticks and float(np.ptp(ratios)) < 0.01 * float(ratios.mean())
 
     def show(self, axes: Axes, which: str = "x") -> None:
         """Label an axis; ticks of numbered values have these, if they are few."""
         axes.set(**{f"{which}label": self.label}, **({f"{which}scale": "log"} if self.log else {}))
-        few = self.numbered and len(self.place) <= _MOST_SHOWN and any(self.texts)
-        if few:
-            turned = {"rotation": 25, "ha": "right"} if sum(map(len, self.texts)) > _CROWDED else {}
-            getattr(axes, f"set_{which}ticks")(self.place, self.texts, **(turned if which == "x" else {}))
+        if self.ticks:
+            turned = which == "x" and sum(map(len, self.texts)) > _CROWDED
+            options: dict[str, Any] = {"rotation": 25, "ha": "right"} if turned else {}
+            getattr(axes, f"set_{which}ticks")(self.place, self.texts, **options)
 
 
 def _text(value: Any) -> str:
@@ -138,7 +140,7 @@ def drawable(dataset: xarray.Dataset) -> list[str]:
         and not {"time", "sample"} & set(variable.dims)
         and name not in _BESIDE
     ]
-    return sorted(found, key=lambda name: (_rank(dataset, name), found.index(name)))
+    return sorted(found, key=lambda name: _rank(dataset, name))
 
 
 def default_of(dataset: xarray.Dataset) -> str:
@@ -146,7 +148,7 @@ def default_of(dataset: xarray.Dataset) -> str:
     conserved quantity and no rounding; the members' status where nothing does.
     """
     results = (name for name in drawable(dataset) if _rank(dataset, name) < _NO_RESULT)
-    return next((name for name in results if not _tells_nothing(dataset, name)), "status")
+    return next((name for name in results if _differs(dataset, name)), "status")
 
 
 def _rank(dataset: xarray.Dataset, name: str) -> int:
@@ -166,33 +168,23 @@ def _rank(dataset: xarray.Dataset, name: str) -> int:
     return next((rank for rank, holds in ranks.items() if holds), 10)
 
 
-def _tells_nothing(dataset: xarray.Dataset, name: str) -> bool:
-    """Whether a variable is the same in all members but for rounding, or rounding itself: a line or a secular
-    rate that is too small beside the signal that it was found in.
+def _differs(dataset: xarray.Dataset, name: str) -> bool:
+    """Whether a variable differs between members by more than rounding, and isn't rounding itself: a line or
+    a secular rate that is too small beside the signal that it was found in.
     """
     variable, dims = dataset[name], _members(dataset)
-    others = [dim for dim in variable.dims if dim not in dims]
-    with np.errstate(invalid="ignore"):
-        spread, size = variable.max(dims) - variable.min(dims), float(np.abs(variable).max())
+    size = float(np.abs(variable).max())
     if variable.sizes[dims[0]] < 2 or not np.isfinite(size):
-        return False
-    if float(spread.max(others)) <= _STILL * size:
         return True
     signal, _, what = name.rpartition("_")
-    if what not in ("amplitude", "rate"):
-        return False
-    over = float(dataset["time_reached"].max()) if what == "rate" and "time_reached" in dataset else 1.0
-    scale = float(np.abs(dataset[f"{signal}_amplitude"]).max()) if f"{signal}_amplitude" in dataset else 0.0
-    radians = str(variable.attrs.get("units", "")).startswith("rad")
-    return size * over <= _NOISE * max(scale, float(radians))
+    over = {"amplitude": 1.0, "rate": float(dataset.get("time_reached", xarray.DataArray(1.0)).max())}
+    own = float(np.abs(dataset.get(f"{signal}_amplitude", xarray.DataArray(0.0))).max())
+    least = _NOISE * max(own, str(variable.attrs.get("units", "")).startswith("rad"))
+    spread = float((variable.max(dims) - variable.min(dims)).max())
+    return spread > _STILL * size and (what not in over or size * over[what] > least)
 
 
-def save_sweep_figure(dataset: xarray.Dataset, path: Any, what: str | None, *, file_format: str) -> None:
-    """Draw a sweep's figure to a file; see ``sweep_figure``."""
-    with rc_context(STYLE):  # type: ignore[arg-type]
-        sweep_figure(dataset, what).savefig(path, dpi=160, format=file_format)
-
-
+@styled
 def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
     """A sweep's page: one variable over its axes, by its name, with ``[INDEX]`` for one component; by default
     the first indicator, else the first time of an event, else a secular rate, else the first quantity kept
@@ -200,65 +192,54 @@ def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
     a readable one.
     ``ValueError`` names the variables there are where there is none of that name.
     """
-    with rc_context(STYLE):  # type: ignore[arg-type]
-        if what is None and {"value", "sigma", "converged"} <= set(dataset.data_vars):
-            return _fits(dataset)
-        names = drawable(dataset)
-        name, bracket, index = (what or default_of(dataset)).partition("[")
-        if name not in names or (bracket and not index.removesuffix("]").isdigit()):
+    longest = sorted((Axis.of(dataset, dim) for dim in _members(dataset)), key=lambda axis: -len(axis.place))
+    if what is None and {"value", "sigma", "converged"} <= set(dataset.data_vars):
+        return _fits(dataset, longest)
+    names, asked = drawable(dataset), re.fullmatch(r"(.+?)(?:\[(\d+)\])?", what or default_of(dataset))
+    if asked is None or asked[1] not in names:
+        raise ValueError(
+            f"{what!r} is nothing that this sweep kept; allowed: {', '.join(names)}, of a vector "
+            "with [0], [1] ... for one component"
+        )
+    found = dataset[asked[1]]
+    divisor, unit = _unit_of(dataset, found)
+    variable = (found / divisor).assign_attrs({**found.attrs, "units": unit})
+    for dim in variable.dims:  # components by the names that people read
+        labels = dataset[dim].values if dim in dataset.coords else range(variable.sizes[dim])
+        variable = variable.assign_coords({dim: [_text(label) for label in labels]})
+    if any(str(dim).endswith(_SECTION) for dim in variable.dims):
+        return _points(
+            dataset, variable, [axis for dim in variable.dims for axis in longest if axis.dim == dim]
+        )
+    kept = [axis for axis in longest[:2] if len(axis.place) > 1] or longest[:1]
+    said = [axis.texts[0] for axis in longest if axis not in kept]
+    variable = variable.isel({axis.dim: 0 for axis in longest if axis not in kept})
+    extra = {str(dim): variable.sizes[dim] for dim in variable.dims if dim not in [a.dim for a in kept]}
+    lines = len(kept) == 1 or len(kept[1].place) <= _FEW < len(kept[0].place)
+    if asked[2] or (extra and (not lines or len(kept) > 1 or kept[0].directions is not None)):
+        number = int(asked[2] or 0)
+        if number >= math.prod(extra.values()):
             raise ValueError(
-                f"{what!r} is nothing that this sweep kept; allowed: {', '.join(names)}, of a vector "
-                "with [0], [1] ... for one component"
+                f"{found.name} has components 0 to {math.prod(extra.values()) - 1}, given {number}"
             )
-        divisor, unit = _unit_of(dataset, dataset[name])
-        variable = (dataset[name] / divisor).assign_attrs({**dataset[name].attrs, "units": unit})
-        members = [Axis.of(dataset, dim) for dim in _members(dataset)]
-        if any(str(dim).endswith(_SECTION) for dim in variable.dims):
-            return _points(dataset, variable, members)
-        kept, variable, said = _cut(variable, members)
-        extra = {str(dim): variable.sizes[dim] for dim in variable.dims if dim not in [a.dim for a in kept]}
-        sizes = [len(axis.place) for axis in kept]
-        lines = len(kept) == 1 or min(sizes) <= _FEW < max(sizes)
-        if bracket or (extra and (not lines or len(kept) > 1 or kept[0].directions is not None)):
-            number = int(index.removesuffix("]") or 0)
-            if number >= math.prod(extra.values()):
-                raise ValueError(
-                    f"{name} has the components 0 to {math.prod(extra.values()) - 1}, given {number}"
-                )
-            place = (
-                dict(zip(extra, np.unravel_index(number, [*extra.values()]), strict=True)) if extra else {}
-            )
-            variable = variable.isel({dim: int(k) for dim, k in place.items()})
-            said += [f"{dim.replace('_', ' ')} {_label(dataset, dim, int(k))}" for dim, k in place.items()]
-        title = "; ".join([_title(variable), *([", ".join(said)] if said else [])])
-        if len(kept) == 1 and kept[0].directions is not None:
-            return _sphere(dataset, variable, kept[0].directions, title)
-        draw = _lines if lines else _map
-        return draw(dataset, variable, sorted(kept, key=lambda a: -len(a.place)) if lines else kept, title)
-
-
-def _cut(variable: xarray.DataArray, members: list[Axis]) -> tuple[list[Axis], xarray.DataArray, list[str]]:
-    """At most two axes of more than one value, the longest; others are cut at their first value."""
-    longest = sorted(members, key=lambda axis: -len(axis.place))[:2]
-    kept = [axis for axis in members if axis in longest and len(axis.place) > 1] or members[:1]
-    cut = [axis for axis in members if axis not in kept]
-    said = [axis.texts[0] if axis.texts else f"{axis.dim.replace('_', ' ')} 0" for axis in cut]
-    return kept, variable.isel({axis.dim: 0 for axis in cut}), said
-
-
-def _label(dataset: xarray.Dataset, dim: str, place: int) -> str:
-    """Label of one place along a dimension, as the component x of a vector."""
-    return _text(dataset[dim].values[place]) if dim in dataset.coords else str(place)
+        place = np.unravel_index(number, tuple(extra.values()))
+        variable = variable.isel({dim: int(k) for dim, k in zip(extra, place, strict=True)})
+        said += [f"{dim.replace('_', ' ')} {variable[dim].item()}" for dim in extra]
+    title = "; ".join([_title(variable), *([", ".join(said)] if said else [])])
+    if len(kept) == 1 and kept[0].directions is not None:
+        return _sphere(dataset, variable, kept[0].directions, title)
+    if lines:
+        return _lines(dataset, variable, kept, title)
+    return _map(dataset, variable, sorted(kept, key=lambda axis: variable.dims.index(axis.dim)), title)
 
 
 def _lines(dataset: xarray.Dataset, variable: xarray.DataArray, kept: list[Axis], title: str) -> Figure:
     """Values over one axis, with a line for each component, or value of another axis."""
     figure, (axis, *others) = blank(dataset, 9.0, 4.4), kept
     axes = figure.add_subplot()
-    rest = [str(dim) for dim in variable.dims if dim != axis.dim]
-    texts = {other.dim: other.texts for other in others}
-    named = [texts.get(d) or [_label(dataset, d, k) for k in range(variable.sizes[d])] for d in rest]
-    labels = [" ".join(parts) for parts in product(*named)]
+    rest = [dim for dim in variable.dims if dim != axis.dim]
+    texts = {dim: variable[dim].values for dim in rest} | {other.dim: other.texts for other in others}
+    labels = [" ".join(parts) for parts in product(*(texts[dim] for dim in rest))]
     order = np.argsort(axis.place, kind="stable")
     table = np.asarray(variable.transpose(axis.dim, *rest).values, dtype=np.float64).reshape(len(order), -1)
     marks: dict[str, Any] = {"marker": "o", "ms": 3.2} if len(order) <= 100 or not axis.ordered else {}
@@ -278,14 +259,12 @@ def _map(dataset: xarray.Dataset, variable: xarray.DataArray, kept: list[Axis], 
     figure = blank(dataset, 8.4, 6.0)
     axes = figure.add_subplot(facecolor=PALE)
     for axis, which in zip(kept, "xy", strict=True):
-        variable = variable.drop_vars(axis.dim, errors="ignore").assign_coords({axis.dim: axis.place})
-        variable = variable.sortby(axis.dim)
+        variable = variable.assign_coords({axis.dim: axis.place}).sortby(axis.dim)
         axis.show(axes, which)
     missing = "" if np.isfinite(variable).all() else " (grey: no value)"
-    scale = _colours(np.asarray(variable.values, dtype=np.float64))
-    bar = {"label": _named(variable), "pad": 0.02, "aspect": 30}
-    options: dict[str, Any] = {"cmap": "viridis", "rasterized": True, "cbar_kwargs": bar}
-    variable.plot.pcolormesh(x=kept[0].dim, y=kept[1].dim, ax=axes, add_labels=False, **options, **scale)
+    bar = {"label": _named(variable), **_BAR}
+    options: dict[str, Any] = {"rasterized": True, "add_labels": False, "cbar_kwargs": bar}
+    variable.plot.pcolormesh(x=kept[0].dim, y=kept[1].dim, ax=axes, **options, **_colours(variable.values))
     axes.grid(visible=False)
     titled(axes, title + missing)
     return figure
@@ -295,37 +274,26 @@ def _colours(values: Array) -> dict[str, Any]:
     """Scale of a map's colours, logarithmic if values span decades, and the ends beyond which some lie: of
     many, a hundredth of the values at the ends doesn't take the colours from all others.
     """
-    finite = values[np.isfinite(values)]
-    if not len(finite):
-        return {"vmin": 0.0, "vmax": 1.0, "extend": "neither"}
-    ends = [0.5, 99.5] if len(finite) >= _MANY else [0, 100]
+    finite = values[np.isfinite(values)] if np.isfinite(values).any() else np.array([0.0, 1.0])
+    low, high = np.percentile(finite, [0.5, 99.5] if len(finite) >= _MANY else [0, 100])
     decades = spans_decades(values)
-    low, high = np.percentile(finite[finite > 0] if decades else finite, ends)
     if not decades and (high - low < 0.5 * np.ptp(finite) or low == high):  # few different values
-        low, high = finite.min(), finite.max()
-        high = high if high > low else low + 1.0
-    beyond = bool((finite < low).any()), bool((finite > high).any())
-    extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(beyond, "neither")
-    return {"extend": extend} | ({"norm": LogNorm(low, high)} if decades else {"vmin": low, "vmax": high})
+        low, high = finite.min(), max(finite.max(), np.nextafter(finite.min() + 1.0, -np.inf))
+    beyond = int((finite < low).any()) + 2 * int((finite > high).any())
+    norm = LogNorm(low, high) if decades else Normalize(low, high)
+    return {"cmap": "viridis", "norm": norm, "extend": ("neither", "min", "max", "both")[beyond]}
 
 
 def _sphere(dataset: xarray.Dataset, variable: xarray.DataArray, ways: Array, title: str) -> Figure:
     """A Mollweide map, +z at the top and +x in the centre, with a dot for each direction, (members, 3)."""
-    figure = blank(dataset, 8.4, 4.8)
-    scale = _colours(np.asarray(variable.values, dtype=np.float64))
+    figure, scale = blank(dataset, 8.4, 4.8), _colours(np.asarray(variable.values, dtype=np.float64))
     extend = scale.pop("extend")
     axes = figure.add_subplot(projection="mollweide", facecolor=PALE)
     longitude, latitude = np.arctan2(ways[:, 1], ways[:, 0]), np.arcsin(np.clip(ways[:, 2], -1, 1))
     figure.canvas.draw()  # the layout says how large the map is
     box = axes.get_window_extent()
-    area = np.pi / 4 * box.width * box.height * (72 / figure.dpi) ** 2  # of the ellipse, square points
-    options: dict[str, Any] = {
-        "s": _FILLED * area / len(ways),
-        "lw": 0,
-        "cmap": "viridis",
-        "rasterized": True,
-    }
-    shown = axes.scatter(longitude, latitude, c=variable.values, **options, **scale)
+    size = _FILLED * np.pi / 4 * box.width * box.height * (72 / figure.dpi) ** 2 / len(ways)  # square points
+    dots = axes.scatter(longitude, latitude, c=variable.values, s=size, lw=0, rasterized=True, **scale)
     places = {"+x": (0, 0), "+y": (np.pi / 2, 0), "−y": (-np.pi / 2, 0), "+z": (0, 1.35), "−z": (0, -1.35)}
     ground = {"boxstyle": "round,pad=0.2", "facecolor": "white", "alpha": 0.7, "linewidth": 0}
     for name, place in places.items():
@@ -333,37 +301,36 @@ def _sphere(dataset: xarray.Dataset, variable: xarray.DataArray, ways: Array, ti
     axes.set(xticklabels=[], yticklabels=[])
     axes.grid(visible=False)
     titled(axes, title)
-    figure.colorbar(shown, ax=axes, label=_named(variable), pad=0.02, aspect=30, shrink=0.7, extend=extend)
+    figure.colorbar(dots, ax=axes, label=_named(variable), shrink=0.7, extend=extend, **_BAR)
     return figure
 
 
 def _points(dataset: xarray.Dataset, variable: xarray.DataArray, members: list[Axis]) -> Figure:
     """A section's points of all members: one component against the other, or the axis of the members."""
     dims = [axis.dim for axis in members]
-    (occurrence,) = [str(dim) for dim in variable.dims if str(dim).endswith(_SECTION)]
-    rest = [str(dim) for dim in variable.dims if dim not in (*dims, occurrence)]
-    whole = np.asarray(variable.transpose(*dims, occurrence, *rest).values, dtype=np.float64)
-    table = whole.reshape(math.prod(variable.sizes[dim] for dim in dims), variable.sizes[occurrence], -1)
-    stride = max(1, -(-table[..., 0].size // _MOST_POINTS))
-    which = np.repeat(np.arange(len(table)), table.shape[1])[::stride]
-    rows = table.reshape(-1, table.shape[2])[::stride]
-    style: dict[str, Any] = {"s": 2.5, "lw": 0, "rasterized": True}
+    (occurrence,) = [dim for dim in variable.dims if str(dim).endswith(_SECTION)]
+    rest = [dim for dim in variable.dims if dim not in (*dims, occurrence)]
+    stacked = variable.stack(member=dims, component=rest).transpose("member", occurrence, "component")
+    stride = max(1, -(-stacked[..., 0].size // _MOST_POINTS))
+    rows = np.asarray(stacked.values, dtype=np.float64).reshape(-1, stacked.shape[2])[::stride]
+    which = np.repeat(np.arange(len(stacked)), stacked.shape[1])[::stride]
     figure = blank(dataset, 8.4, 6.0)
     axes = figure.add_subplot()
+    style: dict[str, Any] = {"s": 2.5, "lw": 0, "rasterized": True}
     if rows.shape[1] > 1:
         # the first two components that vary: what the section is cut at doesn't, but for rounding
         known = rows[np.isfinite(rows).all(axis=1)]
-        spread = np.ptp(known, axis=0) if len(known) else np.ones(rows.shape[1])
-        order = np.argsort(spread <= _STILL * np.abs(known).max(initial=0), kind="stable")
-        one, other = sorted(order[:2].tolist())
-        first, second = (_label(dataset, rest[0], k) if len(rest) == 1 else str(k) for k in (one, other))
+        still = np.ptp(known, axis=0) <= _STILL * np.abs(known).max() if len(known) else [False]
+        one, other = sorted(np.argsort(still, kind="stable")[:2].tolist()) if len(known) else (0, 1)
         axes.scatter(rows[:, one], rows[:, other], c=which, cmap="viridis", **style)
-        axes.set(xlabel=f"{_named(variable)}, {first}", ylabel=f"{_named(variable)}, {second}")
+        across, up = (" ".join(stacked["component"].values[k]) for k in (one, other))
+        axes.set(xlabel=f"{_named(variable)}, {across}", ylabel=f"{_named(variable)}, {up}")
         titled(axes, f"{_title(variable)}; coloured by member")
         return figure
-    place = members[0].place if len(members) == 1 else np.arange(len(table))
+    alone = len(members) == 1
+    place = members[0].place if alone else np.arange(len(stacked))
     axes.scatter(place[which], rows[:, 0], color=GREY, **style)
-    axes.set(xlabel=members[0].label if len(members) == 1 else "member", ylabel=_named(variable))
+    axes.set(xlabel=members[0].label if alone else "member", ylabel=_named(variable))
     titled(axes, _title(variable))
     return figure
 
@@ -379,15 +346,14 @@ def spans_decades(values: Array) -> bool:
     if not len(finite) or finite.min() <= 0:
         return False
     low, high = np.percentile(finite, [2, 98])
-    return bool(math.log10(finite.max() / finite.min()) > 1 and math.log10(high / low) > _DECADES)
+    return bool(finite.max() > 10 * finite.min() and math.log10(high / low) > _DECADES)
 
 
-def _fits(dataset: xarray.Dataset) -> Figure:
+def _fits(dataset: xarray.Dataset, longest: list[Axis]) -> Figure:
     """A panel for each parameter: estimates with bars of one sigma over the longest axis, in colours by a
     second one; dashed where all fits began, hollow without sigma, crosses where a fit didn't converge. The
     last panel has the residuals in their sigmas.
     """
-    longest = sorted((Axis.of(dataset, dim) for dim in _members(dataset)), key=lambda axis: -len(axis.place))
     axis, second = longest[0], [one for one in longest[1:2] if 1 < len(one.place) <= _FEW]
     beyond = longest[1 + len(second) :]
     cut = dataset.isel({one.dim: 0 for one in beyond})
@@ -395,41 +361,33 @@ def _fits(dataset: xarray.Dataset) -> Figure:
     rows = math.ceil((count + 1) / _COLUMNS)
     figure = blank(dataset, 11.0, _PANEL * rows + 1.2)
     panels = np.ravel(figure.subplots(rows, _COLUMNS, squeeze=False))
-    for n, axes in enumerate(panels[: count + 1]):
-        one = cut.isel(parameter=min(n, count - 1))
-        fitted = n < count
-        start = one["start"].values[np.isfinite(one["start"].values)]
-        if fitted and len(start) and np.ptp(start) <= _NOISE * np.abs(start).max():
-            axes.axhline(float(start[0]), color=GREY, lw=1.0, ls="--", label="start")
-        elif not fitted:
-            axes.axhline(1.0, color=GREY, lw=1.0, ls="--")
+    for n, axes in enumerate(panels):
+        one, fitted = cut.isel(parameter=min(n, count - 1)), n < count
+        axes.set_visible(n <= count)
+        start = one["start"].values[np.isfinite(one["start"].values)] if fitted else np.ones(1)
+        if len(start) and np.ptp(start) <= _NOISE * np.abs(start).max():
+            label = "start" if fitted else None
+            axes.axhline(float(start[0]), color=GREY, lw=1.0, ls="--", label=label)
         _estimates(axes, one, axis, second, "value" if fitted else "scale")
-        unit = pretty_unit(str(one["parameter_unit"].values)) if fitted else "in sigmas"
-        title = (
-            str(one["parameter"].values)
-            if fitted
-            else "; ".join(["Residuals", *(x.texts[0] for x in beyond)])
-        )
+        title, unit = "; ".join(["Residuals", *(x.texts[0] for x in beyond)]), "in sigmas"
+        if fitted:
+            title, unit = str(one["parameter"].values), pretty_unit(str(one["parameter_unit"].values))
         (titled if n else key)(axes, title)
         axis.show(axes)
-        axes.set_ylabel("" if unit == "1" else unit)
         lowest = n + _COLUMNS > count
         axes.tick_params(labelbottom=lowest)
-        axes.set_xlabel(axis.label if lowest else "")
-    for empty in panels[count + 1 :]:
-        empty.set_visible(False)
+        axes.set(ylabel="" if unit == "1" else unit, xlabel=axis.label if lowest else "")
     return figure
 
 
 def _estimates(axes: Axes, one: xarray.Dataset, axis: Axis, second: list[Axis], name: str) -> None:
-    count = len(second[0].place) if second else 1
-    width = _APART * (float(np.ptp(axis.place)) or 1.0) if count > 1 and not axis.log else 0.0
-    for n, color in zip(range(count), PALETTE, strict=False):
+    texts = second[0].texts if second else ["estimate, 1 sigma"]
+    width = _APART * (float(np.ptp(axis.place)) or 1.0) if len(texts) > 1 and not axis.log else 0.0
+    for n, (label, color) in enumerate(zip(texts, PALETTE, strict=False)):
         here = one.isel({second[0].dim: n}) if second else one
         value, good = here[name].values, here["converged"].values == 1
         sigma = here["sigma"].values if name == "value" else np.zeros(len(value))
-        at, known = axis.place + width * (n - (count - 1) / 2), good & np.isfinite(sigma)
-        label = second[0].texts[n] if second else "estimate, 1 sigma"
+        at, known = axis.place + width * (n - (len(texts) - 1) / 2), good & np.isfinite(sigma)
         style: dict[str, Any] = {"fmt": "o", "ms": 3.6, "lw": 1.2, "color": color, "label": label}
         axes.errorbar(at[known], value[known], yerr=sigma[known], **style)
         axes.plot(at[good & ~known], value[good & ~known], "o", ms=4.2, mfc="none", color=color)

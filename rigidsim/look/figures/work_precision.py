@@ -1,6 +1,5 @@
 """The work-precision figure: attitude error against cost of every measured setting, and the Pareto front."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from rigidsim.look.figures.style import ShownFigure, save, styled
+from rigidsim.look.figures.style import sheet, styled
 from rigidsim.scene.choices import method_named
 from rigidsim.scene.readable import span_text
 
@@ -21,19 +20,16 @@ _STEPLESS = "*"
 _FRONT = "#1b2733"
 
 
-def save_work_precision(dataset: xarray.Dataset, path: Path) -> Path:
-    """Draw a tradeoff dataset as a page (PNG)."""
-    return save(work_precision_figure, dataset, path)
-
-
 @styled
 def work_precision_figure(dataset: xarray.Dataset) -> Figure:
     """The figure of a tradeoff dataset: the plot, and a key to its numbered points."""
-    figure = ShownFigure(figsize=(12, 6.4), layout="constrained")
+    attrs = dataset.attrs
+    over = "over its first" if attrs["measured_seconds"] < attrs["horizon_seconds"] else "over"
+    words = f"{attrs['title']}: speed against accuracy {over} {span_text(attrs['measured_seconds'], 4)}"
+    figure = sheet(words, 12, 6.4)
     left, right = figure.subplots(1, 2, width_ratios=(1.55, 1))
     draw_points(left, dataset)
     _key(right, dataset)
-    _title(figure, dataset)
     figure.canvas.draw()
     figure.set_layout_engine("none")  # the numbers are placed by what is drawn now
     error, cost, front = _plotted(dataset)
@@ -151,10 +147,3 @@ def _key(axes: Axes, dataset: xarray.Dataset) -> None:
                 x, 1.0 - row * lines, text, ha=align, va="top", fontsize=size, fontweight=weight,
                 transform=axes.transAxes,
             )  # fmt: skip
-
-
-def _title(figure: Figure, dataset: xarray.Dataset) -> None:
-    attrs = dataset.attrs
-    over = "over its first" if attrs["measured_seconds"] < attrs["horizon_seconds"] else "over"
-    words = f"{attrs['title']}: speed against accuracy {over} {span_text(attrs['measured_seconds'], 4)}"
-    figure.suptitle(words, fontsize=12.5, fontweight="bold")

@@ -226,10 +226,8 @@ def compare(
     if out is not None:
         result.save(out)
     if figure is not None:
-        from rigidsim.look.figures.compared import save_compared
-
         with writing(Path(figure)) as temporary:
-            save_compared(thinned(result.dataset), temporary, file_format=Path(figure).suffix.lower()[1:])
+            result.plot().savefig(temporary, format=Path(figure).suffix.lower()[1:])
     if timeline is not None:
         _draw(quiet, given, found, Path(timeline))
     return result

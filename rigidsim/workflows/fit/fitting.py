@@ -144,14 +144,14 @@ def verify_fit(path: str | Path, *, told: Report | None = None) -> Verdict:
 
 def _kept(experiment: Experiment, folder: FitFolder, report: Report | None) -> FitResult:
     """Fit, and write the results."""
-    from rigidsim.look.figures.fitted import save_fitted
+    from rigidsim.look.figures.fitted import fitted_figure
 
     result = fit_to(experiment, folder.copies(experiment), report=report)
     with atomic.replacing(folder.dataset) as temporary:
         result.dataset.to_netcdf(temporary, engine="h5netcdf")
     atomic.write_bytes(folder.fitted, result.experiment.text.encode())
     with atomic.replacing(folder.figure) as temporary:
-        save_fitted(result.dataset, temporary)
+        fitted_figure(result.dataset).savefig(temporary, format="png")
     dataset, fitted = result.dataset, result.experiment
     result = result.having(folder=str(folder.path))
     result._dataset, result._experiment = dataset, fitted

@@ -229,10 +229,10 @@ def required_physics(
         made = made.having([f'name="{config.name[:_LEAST]}-least"'])  # beside the full one's run
         with writing(Path(write)) as new:
             new.write_text(_comments(result) + made.text, encoding="utf-8")
-    from rigidsim.look.figures.ladder import save_ladder  # which loads matplotlib
+    from rigidsim.look.figures.ladder import ladder_figure  # which loads matplotlib
 
     with writing(folder / FIGURE) as temporary:
-        save_ladder(result.as_dict(), temporary)
+        ladder_figure(result.as_dict()).savefig(temporary, format="png")
     return result
 
 
