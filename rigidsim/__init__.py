@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rigidsim.errors import ConfigError, RigidsimError, RunFolderError
     from rigidsim.store.run import MemoryRun, Run, SavedRun, open_run
-    from rigidsim.store.sweeps.folder import SavedSweep, open_sweep
+    from rigidsim.store.sweeps.saved import SavedSweep, open_sweep
     from rigidsim.workflows.analyse import analyse
     from rigidsim.workflows.compare.compared import compare
     from rigidsim.workflows.export import export
@@ -37,7 +37,7 @@ __all__ = [
 _NAMES = {
     "errors": ("ConfigError", "RigidsimError", "RunFolderError"),
     "store.run": ("MemoryRun", "Run", "SavedRun", "open_run"),
-    "store.sweeps.folder": ("SavedSweep", "open_sweep"),
+    "store.sweeps.saved": ("SavedSweep", "open_sweep"),
     "workflows.analyse": ("analyse",),
     "workflows.compare.compared": ("compare",),
     "workflows.export": ("export",),

@@ -24,7 +24,8 @@ from typing import Any
 from experiments.durability.judging import Tally
 from experiments.durability.scenes import same
 from rigidsim.errors import RigidsimError
-from rigidsim.store.sweeps.folder import SweepFolder, open_sweep
+from rigidsim.store.folder import SweepFolder
+from rigidsim.store.sweeps.saved import open_sweep
 from rigidsim.store.sweeps.tiles import read_tile
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweeps.sweep import resume_sweep, sweep
@@ -73,7 +74,7 @@ def disturb_sweeps(tally: Tally, kills: int, draw: random.Random, folder: Path, 
                     break
                 done += 1
             kept = disturbed.tiles()
-            begun = disturbed.folder.is_sweep
+            begun = disturbed.folder.begun_here
             found = resume_sweep(out / "kills") if begun else sweep(parse(CONFIG), out=out)
             tally.expect(found.finished, f"{way}: not finished")
             tally.expect(kept.items() <= disturbed.tiles().items(), f"{way}: tiles were computed again")

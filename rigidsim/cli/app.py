@@ -179,7 +179,7 @@ def sweep(
     """
 
 
-@_command("sweep")
+@_command("saved")
 def resume(
     run_path: options.RunPath,
     until: Annotated[
@@ -204,7 +204,7 @@ def resume(
     """
 
 
-@_command("sweep")
+@_command("saved")
 def verify(
     run_path: options.RunPath,
     members: Annotated[
@@ -306,7 +306,7 @@ def fit(
     """
 
 
-@_command("info")
+@_command("saved")
 def info(run_path: options.RunPath, as_json: options.JsonOption = False) -> None:
     """Summary of a run, finished or partial; exit code 2 if its dataset is damaged or was edited.
 

@@ -13,12 +13,11 @@ from typing import TYPE_CHECKING, Any, Self
 from rigidsim.errors import FORCE, RESUME, Remedy, RunFolderError, run_again
 from rigidsim.look import viewer
 from rigidsim.store import atomic, segments
-from rigidsim.store.folder import RunFolder, find_run
+from rigidsim.store.folder import FitFolder, RunFolder, SweepFolder, WorkFolder, find_run, folder_at
 from rigidsim.store.netcdf import Block
 from rigidsim.store.outputs import refuse_loss
 from rigidsim.store.seal import refuse_damaged
 from rigidsim.store.summary import Brief, Summary
-from rigidsim.store.sweeps.folder import is_sweep
 from rigidsim.store.variables import Extra, Variable
 
 if TYPE_CHECKING:
@@ -26,33 +25,26 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class Run:
-    """The result of a run, wherever its numbers are kept; its ``outcome`` is a ``Summary`` if it ended."""
+class Result:
+    """What a run or a sweep gave, wherever its numbers are kept."""
 
-    outcome: Brief
+    outcome: Any
 
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The content of ``summary.json``."""
-        return self.outcome.as_dict()
+        found: dict[str, Any] = self.outcome.as_dict()
+        return found
 
     @property
     def status(self) -> str:
         """How it ended; ``"finished"`` is the only complete one."""
-        return self.outcome.status
-
-    @property
-    def attitude_error(self) -> float | None:
-        """Certified or estimated error of the attitude at the end, rad; None if unknown."""
-        if not isinstance(self.outcome, Summary):
-            return None
-        accuracy = self.outcome.accuracy
-        return accuracy.estimated_attitude_error if accuracy.certified is None else accuracy.certified
+        return str(self.outcome.status)
 
     @property
     @abstractmethod
     def place(self) -> str:
-        """Description of where the run is kept."""
+        """Description of where it is kept."""
 
     @property
     def files(self) -> list[Path]:
@@ -63,6 +55,40 @@ class Run:
     @abstractmethod
     def dataset(self) -> "xarray.Dataset":
         """The labelled dataset."""
+
+    def __repr__(self) -> str:
+        kind = "Run" if isinstance(self, Run) else "Sweep"
+        return f"<{kind} {self.outcome.name!r} ({self.place}): {self.status}>"
+
+
+class Saved(Result):
+    """A run or a sweep on disk."""
+
+    folder: WorkFolder
+
+    @property
+    def place(self) -> str:
+        """Path of its folder."""
+        return str(self.folder.path)
+
+    @property
+    def files(self) -> list[Path]:
+        """See ``Result``."""
+        return [self.folder.path]
+
+
+class Run(Result):
+    """The result of a run; its ``outcome`` is a ``Summary`` if it ended."""
+
+    outcome: Brief
+
+    @property
+    def attitude_error(self) -> float | None:
+        """Certified or estimated error of the attitude at the end, rad; None if unknown."""
+        if not isinstance(self.outcome, Summary):
+            return None
+        accuracy = self.outcome.accuracy
+        return accuracy.estimated_attitude_error if accuracy.certified is None else accuracy.certified
 
     def plot(self, what: str = "overview") -> "Figure":
         """A figure of the run, by default the page that suits the scene; a notebook shows it.
@@ -133,9 +159,6 @@ class Run:
     def concluded(self, outcome: Brief) -> Self:
         """The same run with the given summary, saved where the run is kept."""
 
-    def __repr__(self) -> str:
-        return f"<Run {self.outcome.name!r} ({self.place}): {self.status}>"
-
     def _repr_html_(self) -> str:
         from html import escape  # which only notebooks need
 
@@ -144,21 +167,11 @@ class Run:
 
 
 @dataclass(frozen=True, repr=False)
-class SavedRun(Run):
+class SavedRun(Saved, Run):
     """A run on disk, finished or partial."""
 
     folder: RunFolder
     outcome: Brief
-
-    @property
-    def place(self) -> str:
-        """Path of the run's folder."""
-        return str(self.folder.path)
-
-    @property
-    def files(self) -> list[Path]:
-        """See ``Run``."""
-        return [self.folder.path]
 
     @contextmanager
     def recording(self) -> Iterator[Path]:
@@ -299,12 +312,11 @@ def open_run(path: str | Path) -> SavedRun:
     Raises:
         RunFolderError: no run there, or a damaged summary.
     """
-    if is_sweep(path):
+    found = folder_at(path)
+    if isinstance(found, SweepFolder):
         what = Remedy("rigidsim info shows it, and rigidsim resume completes it", "use rigidsim.open_sweep")
         raise RunFolderError(f"{path}: is a sweep, no single run; {what}; its dataset.h5 holds all members")
-    from rigidsim.store.fits import is_fit  # which a run doesn't need
-
-    if is_fit(path):
+    if isinstance(found, FitFolder):
         what = Remedy("rigidsim info and rigidsim view show it", "xarray.open_dataset reads its dataset.h5")
         raise RunFolderError(f"{path}: is a fit, no run; {what}; rigidsim run takes its fitted.toml")
     folder = find_run(path)

@@ -5,7 +5,6 @@ A field that isn't given isn't written.
 
 import json
 from collections.abc import Iterable
-from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
@@ -29,16 +28,6 @@ FiniteNumber = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Text = Annotated[StrictStr, Field(max_length=20_000)]
 Three = tuple[FiniteNumber, FiniteNumber, FiniteNumber]
 Four = tuple[FiniteNumber, FiniteNumber, FiniteNumber, FiniteNumber]
-
-
-@dataclass(frozen=True)
-class Reproducible:
-    """Marks a field that follows from the config alone, so that running it again must confirm it.
-
-    ``of_end``: whether it says how the run ended, which an interruption changes.
-    """
-
-    of_end: bool = False
 
 
 class SummaryPart(BaseModel):
@@ -96,7 +85,7 @@ class Cost(SummaryPart):
         smallest_step, largest_step: seconds; None if no step was taken, or none was finite.
     """
 
-    steps: Annotated[StrictInt, Reproducible()]
+    steps: StrictInt
     steps_redone: StrictInt
     smallest_step: FiniteNumber | None
     largest_step: FiniteNumber | None
@@ -124,16 +113,16 @@ class InvariantDrift(SummaryPart):
         put_back: for a projected invariant, the drift that would have been.
     """
 
-    initial: Annotated[FiniteNumber | tuple[FiniteNumber, ...] | None, Reproducible()]
-    units: Annotated[Text, Reproducible()]
-    scale: Annotated[FiniteNumber, Reproducible()]
-    scale_name: Annotated[Text, Reproducible()]
-    largest_drift: Annotated[FiniteNumber | None, Reproducible()]
-    final_drift: Annotated[FiniteNumber | None, Reproducible()]
-    bound: Annotated[FiniteNumber, Reproducible()]
-    put_back: Annotated[FiniteNumber | None, Reproducible()] = None
-    why: Annotated[Text, Reproducible()]
-    numerical: Annotated[StrictBool, Reproducible()]
+    initial: FiniteNumber | tuple[FiniteNumber, ...] | None
+    units: Text
+    scale: FiniteNumber
+    scale_name: Text
+    largest_drift: FiniteNumber | None
+    final_drift: FiniteNumber | None
+    bound: FiniteNumber
+    put_back: FiniteNumber | None = None
+    why: Text
+    numerical: StrictBool
 
 
 class Accuracy(SummaryPart):
@@ -218,8 +207,8 @@ class Modelling(SummaryPart):
         unmeasured: an ``UnmeasuredCode``, why it wasn't found; empty where it was.
     """
 
-    level: Annotated[Text, Reproducible()]
-    short_period: Annotated[StrictBool, Reproducible()]
+    level: Text
+    short_period: StrictBool
     resonance: Text = ""
     momentum_axis: FiniteNumber | None = None
     figure_axis: FiniteNumber | None = None
@@ -228,7 +217,7 @@ class Modelling(SummaryPart):
     growth: FiniteNumber | None = None
     oscillation: FiniteNumber | None = None
     whole: StrictBool = False
-    requested: Annotated[FiniteNumber | None, Reproducible()] = None
+    requested: FiniteNumber | None = None
     how: Text = ""
     unmeasured: Text = ""
     cpu_seconds: FiniteNumber | None = None
@@ -244,12 +233,12 @@ class Modelling(SummaryPart):
 class Lyapunov(SummaryPart):
     """The motion's Lyapunov spectrum, 1/s, and what it implies for the run's digits."""
 
-    chaotic: Annotated[StrictBool, Reproducible()]
-    largest_exponent: Annotated[FiniteNumber, Reproducible()]
-    moved_over_second_half: Annotated[FiniteNumber, Reproducible()]
+    chaotic: StrictBool
+    largest_exponent: FiniteNumber
+    moved_over_second_half: FiniteNumber
     e_folding_seconds: FiniteNumber | None = None
     predictable_seconds: FiniteNumber | None = None
-    exponents: Annotated[tuple[FiniteNumber, ...], Reproducible()] = ()
+    exponents: tuple[FiniteNumber, ...] = ()
     states: tuple[Text, ...] = ()
     units: Text = "s-1"
 
@@ -258,9 +247,9 @@ class EventTimes(SummaryPart):
     """Times at which an event happened, s: the first, at most ``EARLY`` of the first ones, and the last."""
 
     EARLY: ClassVar[int] = 5
-    first: Annotated[FiniteNumber, Reproducible()]
-    last: Annotated[FiniteNumber, Reproducible()]
-    early: Annotated[tuple[FiniteNumber, ...], Reproducible()] = ()
+    first: FiniteNumber
+    last: FiniteNumber
+    early: tuple[FiniteNumber, ...] = ()
 
 
 class Advice(SummaryPart):
@@ -367,11 +356,11 @@ class Span(SummaryPart):
 class Brief(SummaryPart):
     """Fields that every summary has; a run that is under way or was killed has no others."""
 
-    name: Annotated[Text, Reproducible()] = ""
-    description: Annotated[StrictStr, Reproducible()] = ""
-    status: Annotated[StrictStr, Field(pattern=r"^[a-z_: -]{1,40}$"), Reproducible(of_end=True)]
-    message: Annotated[Text, Reproducible(of_end=True)] = ""
-    exit_code: Annotated[StrictInt, Reproducible(of_end=True)] = 0
+    name: Text = ""
+    description: StrictStr = ""
+    status: Annotated[StrictStr, Field(pattern=r"^[a-z_: -]{1,40}$")]
+    message: Text = ""
+    exit_code: StrictInt = 0
 
     @property
     def dataset_digest(self) -> str | None:
@@ -395,35 +384,35 @@ class Summary(Brief):
 
     warnings: tuple[Text, ...]
     warning_codes: tuple[Text, ...] = ()
-    samples: Annotated[StrictInt, Reproducible()]
-    samples_planned: Annotated[StrictInt, Reproducible()]
-    time_reached: Annotated[FiniteNumber, Reproducible()]
-    engine_time: Annotated[FiniteNumber | None, Reproducible()] = None
-    formulation: Annotated[Text, Reproducible()]
-    states: Annotated[tuple[Text, ...], Reproducible()]
-    precision: Annotated[Text, Reproducible()]
-    tolerance: Annotated[FiniteNumber, Reproducible()]
+    samples: StrictInt
+    samples_planned: StrictInt
+    time_reached: FiniteNumber
+    engine_time: FiniteNumber | None = None
+    formulation: Text
+    states: tuple[Text, ...]
+    precision: Text
+    tolerance: FiniteNumber
     cost: Cost
-    method: Annotated[Text, Reproducible()] = DEFAULT_METHOD
-    hold_invariants: Annotated[StrictBool, Reproducible()] = False
-    hold_from_step: Annotated[StrictInt | None, Reproducible()] = None
+    method: Text = DEFAULT_METHOD
+    hold_invariants: StrictBool = False
+    hold_from_step: StrictInt | None = None
     invariants: dict[Text, InvariantDrift]
     unwatched: dict[Text, Text] = Field(default_factory=dict)
     accuracy: Accuracy
     modelling: Modelling | None = None
     tables: dict[Text, TableErrors] = Field(default_factory=dict)
     lyapunov: Lyapunov | None = None
-    body: Annotated[UnderstoodBody, Reproducible()]
-    start: Annotated[Start | None, Reproducible()] = None
-    time: Annotated[Span | None, Reproducible()] = None
+    body: UnderstoodBody
+    start: Start | None = None
+    time: Span | None = None
     loads: tuple[Text, ...] = ()
     bit_for_bit: BitForBit
     provenance: dict[Text, StrictStr | StrictInt]
-    events: Annotated[dict[Text, StrictInt], Reproducible()] = Field(default_factory=dict)
+    events: dict[Text, StrictInt] = Field(default_factory=dict)
     event_times: dict[Text, EventTimes] = Field(default_factory=dict)
-    chart_changes: Annotated[ChartChanges | None, Reproducible()] = None
+    chart_changes: ChartChanges | None = None
     advice: tuple[Advice, ...] = ()
-    undefined_samples: Annotated[dict[Text, StrictInt], Reproducible()] = Field(default_factory=dict)
+    undefined_samples: dict[Text, StrictInt] = Field(default_factory=dict)
     dataset_sha256: Digest | None = None
     timeline_sha256: Digest | None = None
 

@@ -14,8 +14,8 @@ from rigidsim.formats.tables import BLOCK_NUMBERS, tables_of
 from rigidsim.scene.arithmetic import working_bits
 from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.store.outputs import FILE, refuse_loss, writing
-from rigidsim.store.run import SavedRun, open_run
-from rigidsim.store.sweeps.folder import SavedSweep, is_sweep, open_sweep
+from rigidsim.store.run import SavedRun
+from rigidsim.store.sweeps.saved import SavedSweep, open_saved
 from rigidsim.workflows.again import MotionAgain
 from rigidsim.workflows.read import parse
 
@@ -52,7 +52,7 @@ def export(
     """
     found = format_named(file_format)
     if isinstance(saved, str | Path):
-        saved = open_sweep(saved) if is_sweep(saved) else open_run(saved)
+        saved = open_saved(saved)
     for name, value in vars(naming or Naming()).items():
         if value != getattr(Naming(), name) and name not in found.names:
             raise RigidsimError(

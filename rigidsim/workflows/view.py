@@ -11,12 +11,12 @@ from rigidsim.errors import RigidsimError, RunFolderError
 from rigidsim.look import viewer
 from rigidsim.scene.sweep import Sweep
 from rigidsim.store import pictures
-from rigidsim.store.fits import is_fit
+from rigidsim.store.folder import FitFolder, SweepFolder, folder_at
 from rigidsim.store.pictures import FrameProgress
 from rigidsim.store.run import Run, SavedRun, open_run
-from rigidsim.store.sweeps.folder import is_sweep, open_sweep
+from rigidsim.store.sweeps.saved import open_sweep
 from rigidsim.workflows.compare.as_run import open_any
-from rigidsim.workflows.fit.fitting import FitFolder
+from rigidsim.workflows.fit.fitting import read_dataset
 from rigidsim.workflows.fit.result import fitted_run
 from rigidsim.workflows.read import load, parse
 from rigidsim.workflows.run import run
@@ -27,26 +27,27 @@ def runs_of(paths: Sequence[Path], members: Sequence[int] = ()) -> list[tuple[st
     """Runs with their names on the screen, each different; with ``members``, runs of one sweep."""
     if members:
         return _members(paths, members)
-    sweeps = [path for path in paths if is_sweep(path)]
-    if sweeps:
-        raise RunFolderError(
-            f"{sweeps[0]}: is a sweep; choose members of it with --member N (repeatable, counted from 0); "
-            "rigidsim plot draws a variable over its axes"
-        )
-    runs: list[Run] = [_fit(path) if is_fit(path) else open_any(path) for path in paths]
+    runs = [*map(_shown, paths)]
     names = [run.outcome.name for run in runs]
     if len(set(names)) < len(names):
         names = [run.place for run in runs]
     return list(zip(names, runs, strict=True))
 
 
-def _fit(path: Path) -> Run:
-    folder = FitFolder.of(path)
-    return fitted_run(load(folder.fitted), folder.read_dataset(), str(folder.path))
+def _shown(path: Path) -> Run:
+    folder = folder_at(path)
+    if isinstance(folder, SweepFolder):
+        raise RunFolderError(
+            f"{path}: is a sweep; choose members of it with --member N (repeatable, counted from 0); "
+            "rigidsim plot draws a variable over its axes"
+        )
+    if isinstance(folder, FitFolder):
+        return fitted_run(load(folder.fitted), read_dataset(folder), str(folder.path))
+    return open_any(path)
 
 
 def _members(paths: Sequence[Path], members: Sequence[int]) -> list[tuple[str, Run]]:
-    if len(paths) != 1 or not is_sweep(paths[0]):
+    if len(paths) != 1 or not isinstance(folder_at(paths[0]), SweepFolder):
         raise RunFolderError("--member is for one sweep: give its folder (runs/NAME), and no other run")
     folder = open_sweep(paths[0]).folder
     experiment = parse(folder.config.read_text(), source=str(folder.config))

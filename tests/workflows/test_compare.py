@@ -73,22 +73,6 @@ def test_errors_of_steps_and_tolerances_are_integration_errors(experiment: rigid
     assert rigidsim.compare(experiment, {"t": times, "q": q, "w": w}).verdict == "integration_error"
 
 
-def test_unequal_steps_tell_the_order(experiment: rigidsim.Experiment) -> None:
-    """The classical method has order 4, Heun's 2; the attitude's error of a step goes like h^(p+1)."""
-    lengths = np.exp(np.random.default_rng(1).uniform(np.log(0.02), np.log(0.2), 120))
-    lengths *= END / lengths.sum()
-    for order, method in ((4, compare_conventions.classical), (2, compare_conventions.heun)):
-        y, rows = np.concatenate([QUATERNION, START]), [[0.0, *QUATERNION, *START]]
-        for n, step in enumerate(lengths, 1):
-            y = method(slopes, y, step)
-            rows.append([lengths[:n].sum(), *y])
-        table = np.array(rows)
-        found = rigidsim.compare(experiment, {"t": table[:, 0], "q": table[:, 1:5], "w": table[:, 5:]})
-        assert found.local_defects is not None
-        assert found.local_defects.order == pytest.approx(order, abs=0.2)
-        assert found.local_defects.step_tolerance is None
-
-
 def test_a_file_is_read_as_a_run(tmp_path: Path) -> None:
     """Its convention is the one in which the attitude turns at its rates, at any order or direction."""
     times, q, w = theirs(1e-10)

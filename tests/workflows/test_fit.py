@@ -200,16 +200,16 @@ def test_a_killed_fit_begins_again_with_the_same_bits_and_verifies(here: Path) -
         rigidsim.fit("ball.toml", out="fits", told=killed_after(2))
     folder = here / "fits" / "ball"
     with pytest.raises(RunFolderError, match="resume"):
-        fitting.FitFolder(folder).read_result()
+        fitting.read_result(fitting.FitFolder(folder))
     (here / "turn.csv").unlink()  # it has its own copy
     again = fitting.resume_fit(folder)
     assert again.parameters == whole.parameters
     with xarray.open_dataset(folder / "dataset.h5") as saved:
         xarray.testing.assert_identical(saved.load(), xarray.load_dataset(here / "whole/ball/dataset.h5"))
-    assert fitting.verify_fit(folder).identical
+    assert rigidsim.verify(folder).identical
     copy = folder / "data" / "1_turn.csv"
     copy.write_text(copy.read_text().replace("\n0.5,", "\n0.501,"))
-    verdict = fitting.verify_fit(folder)
+    verdict = rigidsim.verify(folder)
     assert not verdict.identical
     assert "data: not the bytes" in verdict.problems[0]
     assert "residual_1" in verdict.differing

@@ -11,7 +11,7 @@ import spiceypy
 from scipy.spatial.transform import Rotation
 from support import run_text
 
-from rigidsim.cli.commands.info import info
+from rigidsim.cli.commands.saved import info
 from rigidsim.look.figures import figure
 
 IAU = Path(__file__).parents[2] / "configs" / "kernels" / "iau2015.tpc"

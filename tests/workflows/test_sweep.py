@@ -22,8 +22,8 @@ from rigidsim import ConfigError, RunFolderError, open_sweep, parse
 from rigidsim import sweep as run_sweep
 from rigidsim.cli.app import app
 from rigidsim.errors import StoppedError
+from rigidsim.store.folder import SweepFolder
 from rigidsim.store.seal import seal
-from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.tiles import read_tile
 from rigidsim.workflows.sweeps.sweep import resume_sweep
 

@@ -11,10 +11,10 @@ from support import config
 import rigidsim
 from rigidsim.errors import RigidsimError
 from rigidsim.look.figures.sweeps import sweep_figure
-from rigidsim.store.sweeps.folder import open_sweep
+from rigidsim.store.sweeps.saved import open_sweep
 from rigidsim.workflows.sweeps.members import single_member
 from rigidsim.workflows.sweeps.sweep import resume_sweep
-from rigidsim.workflows.sweeps.verify import verify_sweep
+from rigidsim.workflows.verify import verify
 
 SIGMA = 0.01  # rad/s
 SPUN = config(initial="angular_velocity = [0.3, 1.0, -0.4]", time="end = 10\nsamples = 21", name="nights")
@@ -96,7 +96,7 @@ def test_a_sweep_of_fits_goes_on_from_its_own_copies(here: Path, monkeypatch: py
     monkeypatch.chdir(here / "elsewhere")
     again = resume_sweep(folder)
     assert again.dataset.equals(before)
-    assert verify_sweep(folder, members=1).identical
+    assert verify(folder, members=1).identical
     for path in (folder / "data").iterdir():
         path.unlink()
     tile.unlink()

@@ -1,13 +1,12 @@
 """Commands on configs: ``new``, ``check``, ``plan``, ``tradeoff``, ``schema``."""
 
-import sys
 from pathlib import Path
 
 import rigidsim.workflows.check as validation
 import rigidsim.workflows.plan as planning
 import rigidsim.workflows.tradeoff as measuring
 from rigidsim.cli.exits import refuse_options
-from rigidsim.cli.screens.page import Page, Styled, answer, print_json
+from rigidsim.cli.screens.page import Page, Styled, answer, print_json, reporting
 from rigidsim.cli.screens.physics import print_physics
 from rigidsim.cli.screens.plan import print_plan, print_tradeoff
 from rigidsim.cli.screens.summary import print_checked
@@ -58,10 +57,7 @@ def plan(
     """Say what would be integrated, of a sweep what one member of it would; or what the scene requires."""
     experiment = load(config, overrides=overrides or [])
     if physics is not None:
-
-        def report(text: str) -> None:
-            print(f"{experiment.config.name}: {text}", file=sys.stderr, flush=True)
-
+        report = reporting(experiment.config.name)
         found = required_physics(experiment, physics, out=out, write=write, force=force, told=report)
         answer(as_json, found.as_dict(), print_physics, found)
         return
@@ -82,10 +78,7 @@ def tradeoff(
 ) -> None:  # fmt: skip
     """Measure speed against accuracy of a scene."""
     experiment = load(config, overrides=overrides or [])
-
-    def report(text: str) -> None:
-        print(f"{experiment.config.name}: {text}", file=sys.stderr, flush=True)
-
+    report = reporting(experiment.config.name)
     result = measuring.tradeoff(
         experiment, others=[_file_and_seconds(text) for text in files or ()],
         out=out, budget=budget, repeats=repeats, full=full, force=force, told=report,

@@ -13,9 +13,10 @@ from rigidsim.formats.registry import Naming
 from rigidsim.look.figure_names import OVERVIEW, SPECTRUM
 from rigidsim.look.figures import available, check_name, figure_format, save_figure
 from rigidsim.look.figures.sweeps import drawable, sweep_figure
+from rigidsim.store.folder import SweepFolder, folder_at
 from rigidsim.store.outputs import ANALYSIS, refuse_loss, writing
-from rigidsim.store.run import SavedRun, ShownRun, open_run
-from rigidsim.store.sweeps.folder import SavedSweep, is_sweep, open_sweep
+from rigidsim.store.run import SavedRun, ShownRun
+from rigidsim.store.sweeps.saved import SavedSweep, open_saved, open_sweep
 from rigidsim.workflows.compare.as_run import open_any
 from rigidsim.workflows.view import render, runs_of, show
 
@@ -43,9 +44,14 @@ def export(
     """Write a run or a sweep for other tools."""
     given = {"epoch": epoch, "axes": axes, "object_name": object_name, "object_id": object_id}
     naming = Naming(**{key: value for key, value in given.items() if value is not None})
-    saved = open_sweep(run_path) if is_sweep(run_path) else open_run(run_path)
     written = exporting.export(
-        saved, file_format, out, force=force, naming=naming, angle_unit=angle_unit, variables=variable or ()
+        open_saved(run_path),
+        file_format,
+        out,
+        force=force,
+        naming=naming,
+        angle_unit=angle_unit,
+        variables=variable or (),
     )
     for path in written:
         print(path)
@@ -53,7 +59,7 @@ def export(
 
 def plot(run_path: Path, what: list[str] | None, out: Path | None, for_slides: str | None) -> None:
     """Draw figures of a run, or maps of a sweep."""
-    swept = is_sweep(run_path)
+    swept = isinstance(folder_at(run_path), SweepFolder)
     if swept or SPECTRUM in (what or []):
         refuse_options("is for figures of a single run other than spectrum", for_slides=for_slides)
     saved = open_sweep(run_path) if swept else open_any(run_path)

@@ -64,10 +64,6 @@ def print_comparison(found: Comparison) -> None:
                     f"{words}, over spans of {span_text(local.window_s, 3)}",
                 ]
             )
-        if local.order is not None:
-            rows.append(["  order", f"{local.order:.2g}", "by their growth with the interval"])
-        if local.step_tolerance is not None:
-            rows.append(["  of its steps", _angle(local.step_tolerance), "held, if rows are its steps"])
     on.table(["", "largest", ""], rows)
     if found.first_disagreement is not None:
         first = found.first_disagreement

@@ -88,3 +88,8 @@ def _plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_plain(content) for content in value]
     return value
+
+
+def reporting(subject: str) -> Callable[[str], None]:
+    """A function that shows lines on the progress of something, on stderr."""
+    return lambda text: print(f"{subject}: {text}", file=sys.stderr, flush=True)

@@ -7,7 +7,7 @@ from pathlib import Path
 from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.scene.sweep import Sweep
 from rigidsim.session.progress import Meter, clock_text, left_text
-from rigidsim.store.sweeps.folder import FittedOfMembers, SavedSweep
+from rigidsim.store.sweeps.saved import FittedOfMembers, SavedSweep
 from rigidsim.workflows.fit.result import digits_text
 from rigidsim.workflows.sweeps.plan import SweepPlan
 from rigidsim.workflows.sweeps.sweep import SweepObserver
@@ -55,12 +55,8 @@ def print_sweep(result: SavedSweep) -> None:
     on.say((outcome.name, "bold"), f" ({result.place}): {outcome.message}")
     place = shlex.quote(result.place)
     if not result.finished:
-        done = f"{outcome.tiles_done:,} of {outcome.tiles:,}" if outcome.tiles is not None else ""
-        if outcome.members_per_second:
-            left = clock_text(outcome.seconds_left)
-            on.line("blocks", f"{done}; {outcome.members_per_second:.3g} members a second, {left} left")
-        elif done:
-            on.line("blocks", done)
+        if outcome.tiles is not None:
+            on.line("blocks", f"{outcome.tiles_done:,} of {outcome.tiles:,}")
         if result.status == "interrupted":
             on.line("next", f"rigidsim resume {place}")
         return

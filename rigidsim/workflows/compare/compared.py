@@ -21,7 +21,7 @@ from rigidsim.workflows.compare.as_run import dataset_of_rows, files_of, traject
 from rigidsim.workflows.compare.columns import LEAST_ROWS, Attitudes, attitudes_of, size_of
 from rigidsim.workflows.compare.conventions import Convention, find_convention
 from rigidsim.workflows.compare.defects import rms
-from rigidsim.workflows.compare.evidence import INTEGRATION_ERROR, Evidence, judged
+from rigidsim.workflows.compare.evidence import Evidence, judged
 from rigidsim.workflows.read import Given, as_experiment, refuse_backwards
 from rigidsim.workflows.run import run
 
@@ -69,8 +69,6 @@ class LocalDefects(SummaryPart):
             over rms of what they do; without rates of what no added acceleration explains over all.
         missing_acceleration: rms, rad/s^2, that would explain the rates' defects, or the attitude's where
             the trajectory has no rates.
-        order: of the tool's method, and step_tolerance: rad, that errors of its steps are held to, if rows
-            are its steps; None where they don't show.
     """
 
     largest: float
@@ -81,8 +79,6 @@ class LocalDefects(SummaryPart):
     window_s: float | None
     unexplained: float | None
     missing_acceleration: float | None
-    order: float | None = None
-    step_tolerance: float | None = None
 
 
 class Disagreement(SummaryPart):
@@ -307,7 +303,7 @@ def _result(seen: Evidence, name: str, files: Mapping[str, str]) -> Comparison:
     """Everything of it, with its dataset; ``files``: those that will be written."""
     trajectory, errors, source = seen.given.trajectory, seen.errors, seen.given.trajectory.source
     drifts, (verdict, why) = seen.drifts(), judged(seen)
-    local, dataset = _local_defects(seen, verdict)
+    local, dataset = _local_defects(seen)
     rows = {
         "attitude_error": (errors, "rad", "angle between the attitudes"),
         "rate_error": (seen.rate_errors, "rad s-1", "difference of angular velocities"),
@@ -360,7 +356,7 @@ def _largest(values: np.ndarray | None) -> float | None:
     return None if values is None else float(values.max())
 
 
-def _local_defects(seen: Evidence, verdict: str) -> tuple[LocalDefects | None, dict[str, Any]]:
+def _local_defects(seen: Evidence) -> tuple[LocalDefects | None, dict[str, Any]]:
     """Local defects as values, and as variables of the dataset."""
     if seen.local is None:
         return None, {}
@@ -374,13 +370,11 @@ def _local_defects(seen: Evidence, verdict: str) -> tuple[LocalDefects | None, d
         words = {"units": "rad s-1", "long_name": "local defect of the angular velocity"}
         dataset["rate_defect"] = ("start", slips, words)
     at = int(np.nanargmax(sizes)) if np.isfinite(sizes).any() else 0
-    share = acceleration = order = tolerance = None
+    share = acceleration = None
     if windows is not None:
         share, acceleration = windows.share, windows.acceleration
     if explained is not None and np.isfinite(explained.unexplained):
         share, acceleration = explained.unexplained / explained.size, explained.acceleration
-    if verdict == INTEGRATION_ERROR and slips is not None:
-        order, tolerance = seen.own_steps
     local = LocalDefects(
         largest=float(sizes[at]),
         rms=float(np.sqrt(np.nanmean(sizes**2))),
@@ -390,8 +384,6 @@ def _local_defects(seen: Evidence, verdict: str) -> tuple[LocalDefects | None, d
         window_s=None if windows is None else windows.length,
         unexplained=share,
         missing_acceleration=acceleration,
-        order=order,
-        step_tolerance=tolerance,
     )
     return local, dataset
 

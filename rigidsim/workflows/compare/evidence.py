@@ -37,12 +37,6 @@ _LONGER = 4.0  # times, by which windows grow until their defects exceed the dig
 _RANDOM = 0.5  # correlation of neighbours, up to which errors come from rounding
 _CLOSE = 0.2  # of the last digit of times, to which the rounding of evenly spaced ones is known
 _EXACT = 1e-13  # relative, of times in double precision
-_LEAST_ROWS = 20
-_UNEQUAL, _MUCH = 1.3, 3.0
-"""Ratio of long intervals to short ones from which a tolerance, and an order, shows."""
-_CLEAR = 0.85  # share of the variance (of logarithms) that the power explains
-_STEEPEST, _FLATTEST = 20.0, 1.7  # slopes of methods of order 1 to 19
-_SIMILAR = 300.0  # ratio of large defects to small ones, up to which they are held
 _NORM = "quaternion_norm"
 _ROUNDING = 1e-13  # rad: what references in double precision, and quaternions of doubles, leave
 _MODEL, _INTEGRATOR = 0.2, 0.5
@@ -260,30 +254,6 @@ class Evidence:
                 found = WindowsOfAttitudes(self.states, self.times, rows, self.rate)
                 return found if np.isfinite(found.defects).all() else None
         return None
-
-    @cached_property
-    def own_steps(self) -> tuple[float | None, float | None]:
-        """Order of the tool's method, and the angle (rad) that errors of its steps are held to, if rows are
-        its steps; None where they don't show.
-
-        A method of order p errs by a multiple of h^(p+1) in a step h. Where steps are chosen by the error,
-        defects are about as large whatever the interval. Equal intervals show neither.
-        """
-        assert self.local is not None
-        starts, sizes, _ = self.local
-        intervals = np.diff(self.times)[starts]
-        seen = np.isfinite(sizes) & (sizes > _ABOVE * self.attitude_noise)
-        if seen.sum() < max(_LEAST_ROWS, len(seen) / 2):
-            return None, None
-        x, y = np.log(intervals[seen]), np.log(sizes[seen])
-        unequal = np.exp(np.subtract(*np.quantile(x, [0.95, 0.05])))
-        if unequal < _UNEQUAL:
-            return None, None
-        slope, clear = float(np.polyfit(x, y, 1)[0]), np.corrcoef(x, y)[0, 1] ** 2
-        if clear >= _CLEAR:
-            return (slope - 1 if unequal >= _MUCH and _FLATTEST <= slope <= _STEEPEST else None), None
-        alike = np.exp(np.subtract(*np.quantile(y, [0.9, 0.1]))) <= _SIMILAR
-        return None, (float(np.quantile(sizes[seen], 0.95)) if alike else None)
 
 
 # --- the verdict -------------------------------------------------------------------------------------------

@@ -2,33 +2,19 @@
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
-import shutil
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray
 
-from rigidsim.errors import (
-    FORCE,
-    OUT,
-    RESUME,
-    SWEEP,
-    ConfigError,
-    Problem,
-    Remedy,
-    RigidsimError,
-    RunFolderError,
-)
+from rigidsim.errors import FORCE, RESUME, SWEEP, ConfigError, Problem, Remedy, RigidsimError, RunFolderError
 from rigidsim.scene.config import Experiment
 from rigidsim.store import atomic, provenance
-from rigidsim.store.fits import BEGUN
-from rigidsim.store.folder import FileOf, WorkFolder
+from rigidsim.store.folder import FitFolder
 from rigidsim.store.outputs import refuse_inputs
 from rigidsim.workflows.fit.estimation import Weighing, search
 from rigidsim.workflows.fit.keys import FitKeys
@@ -43,12 +29,8 @@ from rigidsim.workflows.fit.observations import (
 from rigidsim.workflows.fit.predictions import ByDifferences, ByTangents, Predictor
 from rigidsim.workflows.fit.result import KIND, FitResult, result_of
 from rigidsim.workflows.read import Given, as_experiment, load
-from rigidsim.workflows.verify import Verdict
 
 _ALONG_ROWS = 201
-_NAMES = (
-    "config.toml", "dataset.h5", "summary.json", "fitted.toml", "figure.png", "data", "evaluations", BEGUN,
-)  # fmt: skip
 _AGAIN = f"copy it again from where it is whole, or make the fit again ({FORCE})"
 
 Report = Callable[[str], None]
@@ -91,7 +73,14 @@ def fit(
         raise RigidsimError(f"{missing[0]}: there is no such file; [[fit.data]] files lie next to the config")
     refuse_inputs([folder.path], [*asked.files, *data])
     with folder.locked():
-        folder.begin(asked, places, force=force)
+        # what an interrupted fit left needs no force
+        folder.claim(force=force, mine=folder.holds if folder.begun_here and not folder.finished else ())
+        atomic.write_bytes(folder.begun, json.dumps(identity(asked, places), indent=2).encode())
+        folder.data.mkdir()
+        for files, kept in zip(places, copies(folder, asked), strict=True):
+            for path, copy in zip(files, kept, strict=True):
+                atomic.write_bytes(copy, content(path))
+        atomic.write_bytes(folder.config, asked.text.encode())
         return _kept(asked, folder, told)
 
 
@@ -102,7 +91,7 @@ def resume_fit(path: str | Path, *, told: Report | None = None) -> FitResult:
         RunFolderError: no fit is there, or a finished one.
     """
     folder = FitFolder(Path(path))
-    if not folder.is_fit or not folder.config.is_file():
+    if not folder.begun_here or not folder.config.is_file():
         raise RunFolderError(f"{path}: no fit here; give the folder of one (fits/NAME)")
     if folder.finished:
         raise RunFolderError(f"{path}: the fit is finished; rigidsim verify makes it again and compares")
@@ -110,43 +99,11 @@ def resume_fit(path: str | Path, *, told: Report | None = None) -> FitResult:
         return _kept(load(folder.config), folder, told)
 
 
-def verify_fit(path: str | Path, *, told: Report | None = None) -> Verdict:
-    """Make a finished fit again and compare every number of its dataset, and its fitted config; the verdict's
-    samples are variables.
-
-    Raises:
-        RunFolderError: no finished fit is there.
-    """
-    folder = FitFolder.of(path)
-    saved, experiment = folder.read_dataset(), load(folder.config)
-    copies = folder.copies(experiment)
-    begun = json.loads(folder.begun.read_text(encoding="utf-8"))
-    now, versions = identity(experiment, copies), begun.pop("versions")
-    problems = [
-        f"{key.removesuffix('_sha256')}: not the bytes that the fit was made from"
-        for key, known in begun.items()
-        if known != now.get(key)
-    ]
-    again = fit_to(experiment, copies, report=told)
-    if again.experiment.text != folder.fitted.read_text(encoding="utf-8"):
-        problems.append(f"{folder.fitted.name}: other values than those fitted again")
-    one, other = ({str(name): x for name, x in y.variables.items()} for y in (saved, again.dataset))
-    names = sorted({*one, *other})
-    differing = [n for n in names if n not in one or n not in other or not one[n].equals(other[n])]
-    changed = [
-        f"{name} {then} -> {now['versions'].get(name)}"
-        for name, then in versions.items()
-        if now["versions"].get(name) != then
-    ]
-    identical = not problems and not differing
-    return Verdict(str(folder.path), identical, problems, None, differing, changed, len(names))
-
-
 def _kept(experiment: Experiment, folder: FitFolder, report: Report | None) -> FitResult:
     """Fit, and write the results."""
     from rigidsim.look.figures.fitted import fitted_figure
 
-    result = fit_to(experiment, folder.copies(experiment), report=report)
+    result = fit_to(experiment, copies(folder, experiment), report=report)
     with atomic.replacing(folder.dataset) as temporary:
         result.dataset.to_netcdf(temporary, engine="h5netcdf")
     atomic.write_bytes(folder.fitted, result.experiment.text.encode())
@@ -213,99 +170,43 @@ def fit_to(experiment: Experiment, places: list[DataFiles], *, report: Report | 
 # --- the folder of a fit ----------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class FitFolder(WorkFolder):
-    """Paths of one fit."""
+def read_result(folder: FitFolder) -> FitResult:
+    """The result as it was saved, without its dataset.
 
-    kind = KIND
-    kept = "its copies of config and data stay"
-    resumed = "makes it"
-    seen_by = fcntl.LOCK_EX
+    Raises:
+        RunFolderError: the fit isn't finished, or its summary can't be read.
+    """
+    if not folder.finished:
+        raise RunFolderError(f"{folder.path}: an unfinished fit; {RESUME} makes it")
+    try:
+        return FitResult.model_validate_json(folder.summary.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise RunFolderError(f"{folder.summary}: can't be read ({error}); {_AGAIN}") from None
 
-    fitted = FileOf("fitted.toml")
-    """The config with the estimated values."""
-    figure = FileOf("figure.png")
-    """The figure."""
-    data = FileOf("data")
-    """Copies of the data."""
-    begun = FileOf(BEGUN)
-    """What it was begun with."""
 
-    @classmethod
-    def of(cls, path: str | Path) -> FitFolder:
-        """The folder at a path, or of a file in it."""
-        return cls(Path(path) if Path(path).is_dir() else Path(path).parent)
+def read_dataset(folder: FitFolder) -> xarray.Dataset:
+    """The dataset of a finished fit.
 
-    @property
-    def is_fit(self) -> bool:
-        """Whether the folder holds a fit, finished or not."""
-        return self.begun.is_file()
+    Raises:
+        RunFolderError: it can't be read.
+    """
+    read_result(folder)
+    try:
+        return xarray.load_dataset(folder.dataset, engine="h5netcdf", decode_times=False)
+    except (OSError, ValueError) as error:
+        raise RunFolderError(f"{folder.dataset}: can't be read ({error}); {_AGAIN}") from None
 
-    @property
-    def finished(self) -> bool:
-        """Whether its results are there."""
-        return self.summary.is_file() and self.is_fit
 
-    def begin(self, experiment: Experiment, sources: Sequence[DataFiles], *, force: bool) -> None:
-        """Copy config and data; what an interrupted fit left is replaced.
-
-        Raises:
-            RunFolderError: a finished fit, or something else, is there.
-        """
-        there = self.content(_NAMES)
-        if self.finished and not force:
-            raise RunFolderError(
-                f"{self.path}: a finished fit is there; {FORCE} replaces it, or choose {OUT}"
-            )
-        if there and not self.is_fit and not force:
-            raise RunFolderError(
-                f"{self.path}: holds {min(there)}, and no fit; {FORCE} replaces it, or choose {OUT}"
-            )
-        for name in there:
-            path = self.path / name
-            shutil.rmtree(path) if path.is_dir() else path.unlink()
-        atomic.write_bytes(self.begun, json.dumps(identity(experiment, sources), indent=2).encode())
-        self.data.mkdir()
-        for files, copies in zip(sources, self.copies(experiment), strict=True):
-            for path, copy in zip(files, copies, strict=True):
-                atomic.write_bytes(copy, content(path))
-        atomic.write_bytes(self.config, experiment.text.encode())
-
-    def read_result(self) -> FitResult:
-        """The result as it was saved, without its dataset.
-
-        Raises:
-            RunFolderError: the fit isn't finished, or its summary can't be read.
-        """
-        if not self.finished:
-            raise RunFolderError(f"{self.path}: an unfinished fit; {RESUME} makes it")
-        try:
-            return FitResult.model_validate_json(self.summary.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise RunFolderError(f"{self.summary}: can't be read ({error}); {_AGAIN}") from None
-
-    def read_dataset(self) -> xarray.Dataset:
-        """The dataset of a finished fit.
-
-        Raises:
-            RunFolderError: it can't be read.
-        """
-        self.read_result()
-        try:
-            return xarray.load_dataset(self.dataset, engine="h5netcdf", decode_times=False)
-        except (OSError, ValueError) as error:
-            raise RunFolderError(f"{self.dataset}: can't be read ({error}); {_AGAIN}") from None
-
-    def copies(self, experiment: Experiment) -> list[DataFiles]:
-        """The kept data of a config."""
-        assert experiment.config.fit is not None
-        found = []
-        for number, table in enumerate(experiment.config.fit.data, start=1):
-            numbers = [f"{number}", *(f"{number}_{k}" for k in range(1, len(table.kernels) + 1))]
-            names = [Path(name) for name in (table.file, *table.kernels)]
-            pairs = zip(numbers, names, strict=True)  # the folder of a run is kept as its dataset
-            found.append(tuple(self.data / f"{n}_{x.stem}{x.suffix or '.h5'}" for n, x in pairs))
-        return found
+def copies(folder: FitFolder, experiment: Experiment) -> list[DataFiles]:
+    """The kept data of a config."""
+    assert experiment.config.fit is not None
+    found = []
+    for number, table in enumerate(experiment.config.fit.data, start=1):
+        numbers = [f"{number}", *(f"{number}_{k}" for k in range(1, len(table.kernels) + 1))]
+        names = [Path(name) for name in (table.file, *table.kernels)]
+        pairs = zip(numbers, names, strict=True)  # the folder of a run is kept as its dataset
+        found.append(tuple(folder.data / f"{n}_{x.stem}{x.suffix or '.h5'}" for n, x in pairs))
+    return found
 
 
 def identity(experiment: Experiment, sources: Sequence[DataFiles]) -> dict[str, Any]:

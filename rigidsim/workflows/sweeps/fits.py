@@ -18,7 +18,7 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.sweep import FITS, Sweep
 from rigidsim.solve.status import Status
 from rigidsim.store import atomic
-from rigidsim.store.sweeps.folder import FittedOfMembers
+from rigidsim.store.sweeps.saved import FittedOfMembers
 from rigidsim.store.sweeps.tiles import Kept, KeptVariable
 from rigidsim.workflows.fit.fitting import fit_to
 from rigidsim.workflows.fit.observations import DataFiles, content, digest

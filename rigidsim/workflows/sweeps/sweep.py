@@ -17,16 +17,9 @@ from rigidsim.scene.sweep import Sweep
 from rigidsim.scene.validation_messages import shown
 from rigidsim.session.dataset import kernel_attributes
 from rigidsim.store import atomic
+from rigidsim.store.folder import Begun, SweepFolder
 from rigidsim.store.outputs import refuse_inputs
-from rigidsim.store.sweeps.folder import (
-    Begun,
-    ErrorsOfMembers,
-    SavedSweep,
-    SweepCost,
-    SweepFolder,
-    SweepSummary,
-    open_sweep,
-)
+from rigidsim.store.sweeps.saved import ErrorsOfMembers, SavedSweep, SweepCost, SweepSummary, open_sweep
 from rigidsim.store.sweeps.tiles import Gathered, Kept, Sources, identity, read_tile, write_dataset
 from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.fit.observations import folder_of
@@ -275,18 +268,15 @@ def _run(
         length = tile_length(wanted) if known is None else known.tile
         with folder.locked(shared=share is not None):
             if share is None:
-                folder.claim(force=force)
+                folder.claim(force=force, mine=folder.holds if folder.begun_here else (), clear=force)
             _refuse_other(wanted, folder)
             if beside is not None and files:
                 keep_data(files, beside, folder.data)
             if reads_kernels(wanted.base):
                 for path in folder.tile_files()[:1]:
                     refuse_other_kernel(wanted, read_tile(path).made, path)
-            interrupted, left = _compute(wanted, folder, length, workers, share, observer)
-    if interrupted is not None:
-        raise interrupted
-    if left:
-        return open_sweep(folder.path)
+            if _compute(wanted, folder, length, workers, share, observer):
+                return open_sweep(folder.path)
     try:
         with folder.locked():
             observer.completing()
@@ -333,8 +323,8 @@ def _compute(
     workers: Workers | None,
     share: tuple[int, int] | None,
     observer: SweepObserver,
-) -> tuple[KeyboardInterrupt | None, bool]:
-    """Compute the missing tiles; returns what interrupted the work, if anything, and whether any is left."""
+) -> bool:
+    """Compute the missing tiles; returns whether any is left to others."""
     sources, begun = Sources(wanted, folder.path, folder.tile_files()), folder.begun
     experiment, sha256 = wanted.experiment, wanted.experiment.sha256
     blocks = [range(first, min(first + length, wanted.count)) for first in range(0, wanted.count, length)]
@@ -345,7 +335,6 @@ def _compute(
         alone = begun.alone if begun is not None else _alone(wanted)
         begun = Begun(experiment.text, sha256, int(sources.missing.sum()), len(missing), length, alone)
         folder.begin(begun)
-    os.utime(folder.note)
     first, stop = share or (0, len(blocks))
     ours = [number for number in missing if first <= number < stop]
 
@@ -360,30 +349,16 @@ def _compute(
     todo = sum(int(sources.missing[blocks[number].start : blocks[number].stop].sum()) for number in ours)
     done = begun.members - todo if share is None else 0
     observer.started(folder.path, done + todo, done)
-    try:
-        for task, image in _results(workers, tasks()):
-            if image is not None:
-                atomic.write_bytes(task[0], image)
-            done += len(task[3])
-            observer.progressed(done)
-    except KeyboardInterrupt as interruption:
-        return interruption, True
-    return None, bool(Sources(wanted, folder.path, folder.tile_files()).missing.any())
-
-
-def _results(
-    workers: Workers | None, tasks: Iterator[tuple[Any, ...]]
-) -> Iterator[tuple[tuple[Any, ...], bytes | None]]:
-    """Tasks with what their workers send back: the tile, unless it is saved where they see the folder."""
     if workers is None:
-        return _here(tasks)
-    return workers.each(leave_tile if workers.local else sent_tile, tasks)
-
-
-def _here(tasks: Iterator[tuple[Any, ...]]) -> Iterator[tuple[tuple[Any, ...], None]]:
-    for task in tasks:
-        leave_tile(*task)
-        yield task, None
+        results: Iterator[tuple[Any, bytes | None]] = ((task, leave_tile(*task)) for task in tasks())
+    else:  # tiles are sent back by workers that don't see the folder
+        results = workers.each(leave_tile if workers.local else sent_tile, tasks())
+    for task, image in results:
+        if image is not None:
+            atomic.write_bytes(task[0], image)
+        done += len(task[3])
+        observer.progressed(done)
+    return bool(Sources(wanted, folder.path, folder.tile_files()).missing.any())
 
 
 def _alone(wanted: Sweep) -> bool | None:
