@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import xarray
 
-from rigidsim.analysis.decomposition import Decomposition, amplitude_spectrum, decompose
+from rigidsim.analysis.decomposition import Decomposition, amplitude_spectrum, at_nyquist, decompose
 from rigidsim.analysis.labels import Known, label, reversed_label, settled
-from rigidsim.analysis.refinement import at_nyquist
 from rigidsim.analysis.result import Analysis, SignalAnalysis, SpectralLine
 from rigidsim.analysis.signals import EquidistantTimes, Signal, clock_of, signals_of
 from rigidsim.errors import RigidsimError

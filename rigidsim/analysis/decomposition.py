@@ -15,11 +15,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigidsim.analysis import refinement
-from rigidsim.analysis.exponentials import Reals, Sum
-from rigidsim.analysis.refinement import CLOSEST, SignalSamples, apart, mirrored, refined, remainder
+from rigidsim.analysis.exponentials import Complexes, Reals, SignalSamples, Sum, mirrored, products
 from rigidsim.analysis.secular import hidden_rate
-from rigidsim.analysis.windows import Spectrum, hann, peak, positions, spectrum
+from rigidsim.analysis.windows import Spectrum, hann, moments, peak, positions, spectrum
 
 _FALSE_ALARM = 1e-5  # chance that noise alone shows a line
 _SEARCH_ORDERS = (3, 1)  # of the window while lines are looked for; the second where some are close
@@ -29,6 +27,8 @@ _MOST_CANDIDATES = 40  # peaks that may be no lines, before there are none
 _MOST_OF_SAMPLES = 1.5
 _STEPS = 3  # of Newton's method after each new line
 _HIGHEST_ORDER = 10
+_MOST_STEPS = 25  # of Newton's method
+CLOSEST = 0.6  # bins between lines below which Newton's method can't separate them
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def decompose(
     assert search is not None
     total = search.total
     final = order or _final_order(total, samples.real)
-    total = refinement.settled(double, total, final)
+    total = settled(double, total, final)
     while (weaker := _merged(total, samples.real, search.limit)) is not None:
         search.close.append(float(total.frequencies[weaker]))
         kept = [n for n in range(len(total.frequencies)) if n != weaker]
@@ -76,7 +76,7 @@ def decompose(
             frequencies=tuple(total.frequencies[n] for n in kept),
             amplitudes=tuple(total.amplitudes[n] for n in kept),
         )
-        total = refinement.settled(double, total, final)
+        total = settled(double, total, final)
     if samples.bits > 53:
         total = refined(samples, total, final)
     return _judged(samples, total, final, search)
@@ -133,7 +133,7 @@ class _Search:
             self.total = refined(self.samples, self.total, self.order, steps=2)
         hidden: list[float] = []
         while True:
-            left = remainder(self.samples, self.total)
+            left = self.samples.remainder(self.total)
             if not self.total.frequencies:
                 self.limit = _MOST_OF_SAMPLES * float(np.max(np.abs(left))) / (2 if self.samples.real else 1)
             found = spectrum(left, self.order, real=self.samples.real)
@@ -194,12 +194,12 @@ class _Search:
             frequencies=(*self.total.frequencies, context.mpf(frequency)),
             amplitudes=(*self.total.amplitudes, context.mpc(amplitude)),
         )
-        self.total = refinement.folded(refined(self.samples, self.total, self.order, steps=_STEPS))
+        self.total = folded(refined(self.samples, self.total, self.order, steps=_STEPS))
 
 
 def _judged(samples: SignalSamples, total: Sum, order: int, search: _Search) -> Decomposition:
     """The decomposition, with errors from the remainder."""
-    left = remainder(samples, total)
+    left = samples.remainder(total)
     found = spectrum(left, order, real=samples.real)
     x = positions(total.count)
     weights = hann(total.count, order)
@@ -212,9 +212,9 @@ def _judged(samples: SignalSamples, total: Sum, order: int, search: _Search) -> 
         return math.sqrt(float(np.mean(near**2))) if len(near) else float(found.sizes.max())
 
     # neighbours that are hard to separate make errors grow
-    growth = refinement.error_growth(mirrored(total, samples.real), order)
+    growth = error_growth(mirrored(total, samples.real), order)
     powers, lines = len(total.polynomial), len(total.frequencies) * (2 if samples.real else 1)
-    held = refinement.at_nyquist(total, samples.real)
+    held = at_nyquist(total, samples.real)
     frequency_errors, amplitude_errors = [], []
     for n, (frequency, amplitude) in enumerate(zip(total.frequencies, total.amplitudes, strict=True)):
         level = beside(float(frequency)) * growth[powers + n]
@@ -248,7 +248,7 @@ def amplitude_spectrum(samples: SignalSamples, found: Decomposition, points: int
     those of cosines. Of neighbouring points the largest is kept, so that no line is lost.
     """
     secular = replace(found.sum, frequencies=(), amplitudes=())
-    left = remainder(replace(samples, parts=samples.parts[:1], bits=53), secular)
+    left = replace(samples, parts=samples.parts[:1], bits=53).remainder(secular)
     shown = spectrum(left, min(found.order, _SEARCH_ORDERS[0]), real=samples.real)
     size = shown.sizes * (2 if samples.real else 1)
     group = max(-(-len(size) // points), 1)
@@ -256,3 +256,141 @@ def amplitude_spectrum(samples: SignalSamples, found: Decomposition, points: int
     grouped = np.pad(size, (0, padded - len(size))).reshape(-1, group)
     best = grouped.argmax(axis=1) + group * np.arange(len(grouped))
     return shown.frequencies[best], size[best]
+
+
+def apart(distance: Reals, count: int) -> Reals:
+    """Distances of frequencies, in bins, on the circle of ``count`` bins."""
+    return np.asarray(distance - count * np.round(distance / count))
+
+
+def folded(total: Sum) -> Sum:
+    """The sum with frequencies within half a turn per sample.
+
+    A whole turn per sample changes nothing at whole numbers, but samples are counted from the middle: of an
+    even count by halves, where each turn changes the sign.
+    """
+    turns = [int(total.context.nint(f)) if abs(f) > 0.5 else 0 for f in total.frequencies]
+    if not any(turns):
+        return total
+    odd = [n * (total.count - 1) % 2 for n in turns]
+    return replace(
+        total,
+        frequencies=tuple(f - n for f, n in zip(total.frequencies, turns, strict=True)),
+        amplitudes=tuple(-a if o else a for a, o in zip(total.amplitudes, odd, strict=True)),
+    )
+
+
+def settled(samples: SignalSamples, total: Sum, order: int) -> Sum:
+    """The refined sum; lines that come too close to Nyquist's frequency are held there (``at_nyquist``)."""
+    held = -1
+    while (now := sum(at_nyquist(total, samples.real))) > held:
+        held = now
+        total = _held(folded(refined(samples, total, order)), samples.real)
+    return total
+
+
+def at_nyquist(total: Sum, real: bool) -> list[bool]:
+    """Which lines stand for what is too near Nyquist's frequency to be separated from its mirror image.
+
+    There a real signal only shows the line's amplitude times the cosine of its phase.
+    """
+    return [real and f == 0.5 for f in total.frequencies]
+
+
+def _held(total: Sum, real: bool) -> Sum:
+    """The sum with lines near Nyquist's frequency moved to it, with the amplitude that the samples show."""
+    context, count = total.context, total.count
+    frequencies, amplitudes = list(total.frequencies), list(total.amplitudes)
+    for n, (frequency, amplitude) in enumerate(zip(frequencies, amplitudes, strict=True)):
+        if real and 2 * abs(0.5 - abs(frequency)) * count < CLOSEST:
+            amplitude = context.conj(amplitude) if frequency < 0 else amplitude
+            frequencies[n] = context.mpf(0.5)
+            # the exponential is real at samples counted by whole numbers, imaginary at those by halves
+            amplitudes[n] = context.mpc(amplitude.real, 0) if count % 2 else context.mpc(0, amplitude.imag)
+    return replace(total, frequencies=tuple(frequencies), amplitudes=tuple(amplitudes))
+
+
+def refined(samples: SignalSamples, total: Sum, order: int, steps: int = _MOST_STEPS) -> Sum:
+    """Apply Newton's method to a sum as long as it improves."""
+    if not total.frequencies and not total.polynomial:
+        return total
+    last = math.inf
+    for _ in range(steps):
+        left = samples.remainder(total)
+        change, moved, size = _step(samples, total, left, order)
+        if not size < 0.7 * last and steps == _MOST_STEPS and last < 1e-3:
+            break  # the last step was rounding already
+        total, last = moved, size
+        if change == 0:
+            break
+    return total
+
+
+def _step(samples: SignalSamples, total: Sum, left: Complexes, order: int) -> tuple[float, Sum, float]:
+    """The largest change of an amplitude, the sum after the step, and the step's size over the signal's."""
+    context, count = total.context, total.count
+    whole = mirrored(total, samples.real)
+    lines, powers = len(whole.frequencies), len(whole.polynomial)
+    right = _products(whole, left, order)
+    matrix = _gram(whole, order)
+    found = np.linalg.lstsq(matrix, right, rcond=1e-12)[0]
+    polynomial = found[:powers]
+    change, turning = found[powers : powers + lines], found[powers + lines :]
+    own = lines // 2 if samples.real else lines
+    held = at_nyquist(total, samples.real)
+    frequencies, amplitudes = [], []
+    for k in range(own):
+        amplitude = complex(whole.amplitudes[k])
+        # a exp(i pi D x), D in bins: the change with D is i pi x a exp(...)
+        shift = (turning[k] / amplitude).imag / math.pi if amplitude and not held[k] else 0.0
+        shift = float(np.clip(shift, -0.5, 0.5))
+        frequencies.append(total.frequencies[k] + context.mpf(shift) / count)
+        amplitudes.append(total.amplitudes[k] + context.mpc(complex(change[k])))
+    coefficients = [
+        c + context.mpc(complex(x.real if samples.real else x))
+        for c, x in zip(total.polynomial, polynomial, strict=True)
+    ]
+    largest = max([abs(complex(a)) for a in (*amplitudes, *coefficients)], default=0.0)
+    size = float(np.max(np.abs(found), initial=0.0))
+    moved = replace(
+        total,
+        polynomial=tuple(coefficients),
+        frequencies=tuple(frequencies),
+        amplitudes=tuple(amplitudes),
+    )
+    return size, moved, size / largest if largest else 0.0
+
+
+def _products(total: Sum, left: Complexes, order: int) -> Complexes:
+    """Windowed means of a remainder times powers of x, conj(exp(i w t)) and x conj(exp(i w t))."""
+    x = positions(total.count)
+    weighted = left * hann(total.count, order) / total.count
+    powers = np.array([np.sum(weighted * x**m) for m in range(len(total.polynomial))], dtype=np.complex128)
+    turned = [products(values, total.frequencies) for values in (weighted, weighted * x)]
+    return np.concatenate([powers, *turned])
+
+
+def _gram(total: Sum, order: int) -> Complexes:
+    """Approximate windowed means of the products of all columns; the next step corrects the approximation."""
+    count = total.count
+    places = np.array([float(f) for f in total.frequencies]) * count
+    powers, lines = len(total.polynomial), len(places)
+    places = np.concatenate([np.zeros(powers), places, places])
+    raised = np.concatenate([np.arange(powers), np.zeros(lines, int), np.ones(lines, int)])
+    distance = places[None, :] - places[:, None]
+    turns = np.round(distance / count)  # frequencies are on a circle: see ``apart`` and ``folded``
+    power = raised[None, :] + raised[:, None]
+    matrix = np.zeros(distance.shape, dtype=np.complex128)
+    for m in np.unique(power):
+        chosen = power == m
+        matrix[chosen] = moments(order, int(m), (distance - turns * count)[chosen])
+    return np.where(turns * (count - 1) % 2, -matrix, matrix)
+
+
+def error_growth(total: Sum, order: int) -> Reals:
+    """Factor by which the error of each column's coefficient exceeds a lone column's."""
+    matrix = _gram(total, order)
+    if not len(matrix):
+        return np.empty(0)
+    inverse = np.linalg.pinv(matrix, rcond=1e-12, hermitian=True)
+    return np.sqrt(np.maximum(np.diag(inverse).real * np.diag(matrix).real, 1.0))

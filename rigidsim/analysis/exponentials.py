@@ -17,7 +17,6 @@ Reals = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 _GUARD = 40  # bits for the growth of rounding along a table
-_ROWS = 64  # of blocks that are worked on at once, in a precision beyond double
 
 
 def exponentials(frequencies: Sequence[Any], numbers: NDArray[np.int64]) -> Complexes:
@@ -34,39 +33,25 @@ def exponentials(frequencies: Sequence[Any], numbers: NDArray[np.int64]) -> Comp
     return result
 
 
-@dataclass(frozen=True)
-class Grid:
-    """Numbers of samples counted from the middle of a series, in blocks."""
+def _width(count: int) -> int:
+    """Number of samples in a block: about the square root of all."""
+    return 1 << max(math.ceil(math.log2(max(count, 2)) / 2), 1)
 
-    count: int
 
-    @property
-    def width(self) -> int:
-        """Number of samples in a block: about the square root of the total."""
-        return 1 << max(math.ceil(math.log2(max(self.count, 2)) / 2), 1)
+def tables(frequencies: Sequence[Any], count: int) -> tuple[Complexes, Complexes]:
+    """exp(2 pi i f n) of the blocks' first samples, counted from the middle of so many, and within blocks;
+    frequencies in turns per sample.
+    """
+    width = _width(count)
+    first = 2 * width * np.arange(-(-count // width)) - (count - 1)
+    return exponentials(frequencies, first), exponentials(frequencies, 2 * np.arange(width))
 
-    @property
-    def rows(self) -> int:
-        """Number of blocks that hold all samples."""
-        return -(-self.count // self.width)
 
-    def blocks(self, values: Any) -> Any:
-        """Samples (n,) as (blocks, block length), padded with zeros."""
-        return np.pad(values, (0, self.rows * self.width - self.count)).reshape(self.rows, self.width)
-
-    @property
-    def first(self) -> NDArray[np.int64]:
-        """Twice the number of each block's first sample."""
-        return 2 * self.width * np.arange(self.rows) - (self.count - 1)
-
-    @property
-    def within(self) -> NDArray[np.int64]:
-        """Twice the number of each sample from its block's first."""
-        return 2 * np.arange(self.width)
-
-    def tables(self, frequencies: Sequence[Any]) -> tuple[Complexes, Complexes]:
-        """exp(2 pi i f n) of the blocks' first samples and within blocks; frequencies in turns per sample."""
-        return exponentials(frequencies, self.first), exponentials(frequencies, self.within)
+def products(values: Any, frequencies: Sequence[Any]) -> Complexes:
+    """Sums (frequencies,) of samples (n,) times conj(exp(2 pi i f n))."""
+    first, within = tables(frequencies, len(values))
+    blocks = np.pad(values, (0, len(first) * len(within) - len(values))).reshape(len(first), -1)
+    return np.asarray(np.sum(np.conj(first) * (blocks @ np.conj(within)), axis=0))
 
 
 @dataclass(frozen=True)
@@ -83,8 +68,7 @@ class Sum:
 
     def values(self) -> Complexes:
         """All samples, in double precision."""
-        grid = Grid(self.count)
-        first, within = grid.tables(self.frequencies)
+        first, within = tables(self.frequencies, self.count)
         total = (first * np.array([complex(a) for a in self.amplitudes])) @ within.T
         flat = total.ravel()[: self.count]
         if self.polynomial:
@@ -101,32 +85,81 @@ class Sum:
             amplitudes=tuple(turn * f * a for f, a in zip(self.frequencies, self.amplitudes, strict=True)),
         )
 
-    def left_of(self, parts: Sequence[tuple[Reals, Reals]], bits: int) -> Complexes:
-        """A signal, real and imaginary parts (n,) summed over the list, less this sum, in double precision;
-        with more bits than 53 the difference is taken in as many, and rounded once.
-        """
-        if bits <= 53:
-            real, imaginary = parts[0]
-            return np.asarray(real + 1j * imaginary - self.values())
-        return _wide_difference(self, parts, bits)
+
+@dataclass(frozen=True)
+class SignalSamples:
+    """Equidistant samples of a signal: real and imaginary parts (n,), summed over the list.
+
+    The mpmath context has more than the precision's bits. By so much of a spacing samples are late, (n,):
+    times are rounded, in a pattern that would show up as lines.
+    """
+
+    parts: tuple[tuple[Reals, Reals], ...]
+    real: bool
+    bits: int
+    context: Any
+    late: Reals | None = None
+
+    @property
+    def count(self) -> int:
+        """Number of samples."""
+        return len(self.parts[0][0])
+
+    def remainder(self, total: Sum) -> Complexes:
+        """The remainder without a sum, in double precision; beyond it the difference is rounded once."""
+        whole = mirrored(total, self.real)
+        if self.bits > 53:
+            left = _wide_difference(whole, self.parts, self.bits + _GUARD)
+        else:
+            left = self.parts[0][0] + 1j * self.parts[0][1] - whole.values()
+            if self.late is not None and (whole.frequencies or whole.polynomial):
+                left = left - self.late * whole.slope().values()
+        return np.asarray(left.real + 0j if self.real else left, dtype=np.complex128)
+
+
+def mirrored(total: Sum, real: bool) -> Sum:
+    """The sum together with the mirror images of a real signal's lines."""
+    if not real:
+        return total
+    context = total.context
+    return replace(
+        total,
+        frequencies=(*total.frequencies, *(-f for f in total.frequencies)),
+        amplitudes=(*total.amplitudes, *(context.conj(a) for a in total.amplitudes)),
+    )
 
 
 def _wide_difference(total: Sum, parts: Sequence[tuple[Reals, Reals]], bits: int) -> Complexes:
-    """See ``Sum.left_of``: in fixed point, with integers that lose nothing until they are rounded."""
-    bits += _GUARD
+    """A signal, real and imaginary parts (n,) summed over the list, less a sum, in integers that lose nothing
+    until they are rounded: numbers are whole ones of 2^(unit - bits), turned ones and positions of 2^-bits.
+    """
+    context, count = total.context, total.count
     terms = [*total.amplitudes, *total.polynomial, *(np.max(np.abs(part)) for part in parts[0])]
-    unit = math.frexp(max(float(abs(x)) for x in terms))[1]
-    left, right = _factors(total, bits, unit)
-    grid, shift = Grid(total.count), 2 * bits - unit
-    result = np.empty(grid.count, dtype=np.complex128)
-    for row in range(0, grid.rows, _ROWS):
-        begin, end = row * grid.width, min((row + _ROWS) * grid.width, grid.count)
-        for target, factor, columns in zip(
-            (result.real, result.imag), left, zip(*parts, strict=True), strict=True
+    shift = bits - math.frexp(max(float(abs(x)) for x in terms))[1]
+    width, result = _width(count), np.empty(count, dtype=np.complex128)
+    lines = [
+        (
+            _powers(context, a * context.expjpi(f * (1 - count)), 2 * f * width, -(-count // width), shift),
+            np.array(_powers(context, context.mpc(1), 2 * f, width, bits), dtype=object),
+        )
+        for f, a in zip(total.frequencies, total.amplitudes, strict=True)
+    ]
+    factors = [[int(context.ldexp(x, shift)) for x in (c.real, c.imag)] for c in total.polynomial]
+    for row, begin in enumerate(range(0, count, width)):
+        here = slice(begin, min(begin + width, count))
+        x = np.array([(2 * n - (count - 1) << bits) // count for n in range(count)[here]], dtype=object)
+        model = np.zeros((2, len(x)), dtype=object)
+        for factor in reversed(factors):
+            model = (model * x >> bits) + np.array(factor, dtype=object)[:, None]
+        for (real, imaginary), within in lines:
+            u, v = within[:, : len(x)]
+            c, s = real[row], imaginary[row]
+            model = model + np.array([c * u - s * v >> bits, c * v + s * u >> bits])
+        for target, modelled, columns in zip(
+            (result.real, result.imag), model, zip(*parts, strict=True), strict=True
         ):
-            fixed = sum(_fixed(column[begin:end], shift) for column in columns)
-            modelled = (factor[row : row + _ROWS] @ right).ravel()[: end - begin]
-            target[begin:end] = (fixed - modelled) / (1 << shift)
+            left = sum(_fixed(column[here], shift) for column in columns) - modelled
+            target[here] = np.ldexp(left.astype(np.float64), -shift)
     return result
 
 
@@ -138,57 +171,14 @@ def _fixed(values: Reals, shift: int) -> Any:
     return np.array([n << m if m >= 0 else n >> -m for n, m in zip(whole, moves, strict=True)], dtype=object)
 
 
-def _factors(total: Sum, bits: int, unit: int) -> tuple[tuple[Any, Any], Any]:
-    """Factors of the real and of the imaginary part, (blocks, terms), and the one that they share, (terms,
-    block length), as whole numbers of 2^(unit - bits) and of 2^-bits.
-    """
-    context = type(total.context)()
-    context.prec = bits + 20
-    grid = Grid(total.count)
-    real: list[list[int]] = []
-    imaginary: list[list[int]] = []
-    shared: list[list[int]] = []
-    for frequency, amplitude in zip(total.frequencies, total.amplitudes, strict=True):
-        turn = 2 * context.mpf(frequency)
-        start = context.mpc(amplitude) * context.expjpi(turn * (1 - total.count) / 2)
-        start = context.mpc(context.ldexp(start.real, -unit), context.ldexp(start.imag, -unit))
-        c, s = _powers(context, start, turn * grid.width, grid.rows, bits)
-        u, v = _powers(context, context.mpc(1), turn, grid.width, bits)
-        real += [c, [-x for x in s]]
-        imaginary += [s, c]
-        shared += [u, v]
-    # (x + y)^m, from where the block begins and where the sample is in it
-    x = [(int(n) << bits) // total.count for n in grid.first]
-    y = [(int(n) << bits) // total.count for n in grid.within]
-    for power in range(len(total.polynomial)):
-        for target, part in ((real, "real"), (imaginary, "imag")):
-            column = [0] * grid.rows
-            for m in range(power, len(total.polynomial)):
-                number = getattr(context.mpc(total.polynomial[m]), part)
-                factor = int(context.ldexp(number * math.comb(m, power), bits - unit))
-                raised = _raised(x, m - power, bits)
-                column = [a + (factor * b >> bits) for a, b in zip(column, raised, strict=True)]
-            target.append(column)
-        shared.append(_raised(y, power, bits))
-    first = [np.array(columns, dtype=object).T for columns in (real, imaginary)]
-    return (first[0], first[1]), np.array(shared, dtype=object)
-
-
-def _raised(values: list[int], power: int, bits: int) -> list[int]:
-    result = [1 << bits] * len(values)
-    for _ in range(power):
-        result = [a * b >> bits for a, b in zip(result, values, strict=True)]
-    return result
-
-
-def _powers(context: Any, start: Any, turn: Any, count: int, bits: int) -> tuple[list[int], list[int]]:
-    """Real and imaginary parts of start exp(i pi turn n), as whole numbers of 2^-bits."""
-    extra = bits + 16
-    step = context.expjpi(turn)
-    c, s, x, y = (int(context.ldexp(v, extra)) for v in (step.real, step.imag, start.real, start.imag))
+def _powers(context: Any, start: Any, turn: Any, count: int, shift: int) -> tuple[list[int], list[int]]:
+    """Real and imaginary parts of start exp(i pi turn n), as whole numbers of 2^-shift."""
+    step, scale = context.expjpi(turn), context.prec
+    c, s = (int(context.ldexp(v, scale)) for v in (step.real, step.imag))
+    x, y = (int(context.ldexp(v, shift + 16)) for v in (start.real, start.imag))
     real, imaginary = [], []
     for _ in range(count):
         real.append(x >> 16)
         imaginary.append(y >> 16)
-        x, y = (x * c - y * s) >> extra, (x * s + y * c) >> extra
+        x, y = (x * c - y * s) >> scale, (x * s + y * c) >> scale
     return real, imaginary

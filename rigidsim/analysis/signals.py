@@ -10,7 +10,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from rigidsim.analysis.refinement import SignalSamples
+from rigidsim.analysis.exponentials import SignalSamples
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.parts_of_values import parts_in
 

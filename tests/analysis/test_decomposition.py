@@ -9,9 +9,8 @@ import pytest
 from support import cases
 
 from rigidsim.analysis.decomposition import Decomposition, decompose
-from rigidsim.analysis.exponentials import Sum
+from rigidsim.analysis.exponentials import SignalSamples, Sum
 from rigidsim.analysis.labels import Known, Label, label
-from rigidsim.analysis.refinement import SignalSamples
 
 CONTEXT = mpmath.MPContext()
 CONTEXT.prec = 220
