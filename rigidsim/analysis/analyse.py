@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import xarray
 
-from rigidsim.analysis.decomposition import Decomposition, amplitude_spectrum, at_nyquist, decompose
-from rigidsim.analysis.labels import Known, label, reversed_label, settled
+from rigidsim.analysis.decomposition import amplitude_spectrum, at_nyquist, decompose
+from rigidsim.analysis.labels import Known, Label, label, reversed_label, settled
 from rigidsim.analysis.result import Analysis, SignalAnalysis, SpectralLine
 from rigidsim.analysis.signals import EquidistantTimes, Signal, clock_of, signals_of
 from rigidsim.errors import RigidsimError
@@ -18,28 +18,6 @@ from rigidsim.scene.parts_of_values import in_time_order
 SPECTRUM_POINTS = 4000
 _BLEND = 0.05  # bins by which a line can be off that has absorbed closer ones
 _SECULAR = "node_longitude.figure"
-
-
-@dataclass(frozen=True)
-class _Raw:
-    """A signal before its lines are labelled, with frequencies in rad/s."""
-
-    signal: Signal
-    found: Decomposition
-    frequencies: tuple[Any, ...]
-    errors: tuple[float, ...]
-    spectrum: tuple[Any, Any]
-    bits: int
-
-    def finest(self, line: SpectralLine) -> float:
-        """Frequency error of a line as it was found, rad/s."""
-        distance = [abs(abs(float(f)) - abs(float(line.observed))) for f in self.frequencies]
-        return self.errors[distance.index(min(distance))]
-
-    @property
-    def factor(self) -> int:
-        """Ratio of a cosine's amplitude to its exponential's: 2 for real signals, otherwise 1."""
-        return 2 if self.signal.real else 1
 
 
 def analyse_dataset(
@@ -69,21 +47,19 @@ def analyse_dataset(
     if order is not None and not 1 <= order <= 20:
         raise RigidsimError(f"given a window of order {order}; 1 to 20 are allowed")
     dataset = in_time_order(dataset)
-    clock = clock_of(dataset)
-    raws = [_raw(signal, clock, lines, floor, order) for signal in signals_of(dataset, variables)]
-    sizes = [[raw.factor * abs(complex(a)) for a in raw.found.sum.amplitudes] for raw in raws]
-    measured = [
-        list(zip(raw.frequencies, raw.errors, size, strict=True))
-        for raw, size in zip(raws, sizes, strict=True)
-    ]
+    clock, signals = clock_of(dataset), signals_of(dataset, variables)
+    found = [_decomposed(signal, clock, lines, floor, order) for signal in signals]
     fastest = max([fastest, *(abs(float(k.value)) for k in known), _largest_rate(dataset)])
     # twice, since a body of three moments moves at twice its own rate, too
     faster = not fastest or 2 * fastest > clock.nyquist
-    names = _with_precession(known, raws, clock)
-    in_body = [raw.signal.in_body for raw in raws]
-    names = settled([k for k in names if float(k.value) != 0], measured, in_body)
+    names = [k for k in _with_precession(known, found, clock) if float(k.value) != 0]
+    measured = [[(x.frequency, x.frequency_error, float(x.amplitude)) for x in one.lines] for one in found]
+    in_body = [signal.in_body for signal in signals]
+    names = settled(names, measured, in_body)
     return Analysis(
-        signals=tuple(_named(raw, clock, names, faster) for raw in raws),
+        signals=tuple(
+            _labelled(one, clock, names, faster, inside) for one, inside in zip(found, in_body, strict=True)
+        ),
         known=tuple(names),
         start=float(clock.start),
         spacing=float(clock.spacing),
@@ -93,27 +69,59 @@ def analyse_dataset(
     )
 
 
-def _raw(signal: Signal, clock: EquidistantTimes, lines: int, floor: float, order: int | None) -> _Raw:
-    samples = signal.samples(clock)
+def _decomposed(
+    signal: Signal, clock: EquidistantTimes, lines: int, floor: float, order: int | None
+) -> SignalAnalysis:
+    """A signal's analysis with lines that have no labels yet."""
+    samples, context, real = signal.samples(clock), clock.context, signal.real
     found = decompose(samples, lines, signal.degree, floor, order)
-    per_sample = 2 * clock.context.pi / clock.spacing
+    per_sample, factor = 2 * context.pi / clock.spacing, 2 if real else 1  # of a cosine to its exponential
     finest = 2.0**-clock.bits  # of the spacing
-    errors = [
-        math.hypot(float(per_sample) * e, finest * abs(float(per_sample * f)))
-        for f, e in zip(found.sum.frequencies, found.frequency_errors, strict=True)
-    ]
-    curve = amplitude_spectrum(samples, found, SPECTRUM_POINTS)
-    return _Raw(
-        signal,
-        found,
-        tuple(per_sample * f for f in found.sum.frequencies),
-        tuple(errors),
-        (curve[0] * float(per_sample), curve[1]),
-        samples.bits,
+    total, listed = found.sum, []
+    for n, (frequency, amplitude) in enumerate(zip(total.frequencies, total.amplitudes, strict=True)):
+        observed, size = per_sample * frequency, abs(complex(amplitude))
+        if real and frequency < 0:
+            observed, amplitude = -observed, context.conj(amplitude)
+        error, held = found.amplitude_errors[n], at_nyquist(total, real)[n]
+        line = SpectralLine(
+            frequency=observed,
+            observed=observed,
+            frequency_error=math.hypot(
+                float(per_sample) * found.frequency_errors[n], finest * float(abs(observed))
+            ),
+            amplitude=factor * abs(amplitude),
+            amplitude_error=factor * error,
+            phase=_wrapped(context, context.arg(amplitude) - observed * clock.middle),
+            phase_error=error / size if size and not held else math.inf,
+            label=Label(),
+            mismatch=math.nan,
+        )
+        listed.append(line)
+    degree, errors, per_second = signal.degree, found.polynomial_errors, 2 / clock.length
+    frequencies, sizes = amplitude_spectrum(samples, found, SPECTRUM_POINTS)
+    return SignalAnalysis(
+        name=signal.name,
+        units=signal.units,
+        real=real,
+        value=total.polynomial[0] if degree >= 0 else None,
+        value_error=errors[0] if degree >= 0 else math.nan,
+        rate=total.polynomial[1].real * per_second if degree > 0 else None,
+        rate_error=errors[1] * float(per_second) if degree > 0 else math.nan,
+        lines=tuple(sorted(listed, key=lambda line: -line.amplitude)),
+        order=found.order,
+        bits=samples.bits,
+        left=found.left,
+        level=factor * found.level,
+        close=tuple(f * float(per_sample) for f in found.close),
+        exhausted=found.exhausted,
+        notes=(),
+        spectrum=(frequencies * float(per_sample), sizes),
     )
 
 
-def _with_precession(known: Sequence[Known], raws: Sequence[_Raw], clock: EquidistantTimes) -> list[Known]:
+def _with_precession(
+    known: Sequence[Known], signals: Sequence[SignalAnalysis], clock: EquidistantTimes
+) -> list[Known]:
     """The known frequencies with the equinox's, unless known: it moves back with the measured precession.
 
     Where an axis follows the node of an orbit, its rate is that node's. Of samples that don't span 1.5
@@ -122,19 +130,13 @@ def _with_precession(known: Sequence[Known], raws: Sequence[_Raw], clock: Equidi
     names = list(known)
     if not known or any(k.name == "precession" for k in known) or _slow(known, clock):
         return names
-    for raw in raws:
-        if raw.signal.name in (_SECULAR, "node_longitude"):
-            rate, error = _rate(raw, clock)
+    for one in signals:
+        if one.name in (_SECULAR, "node_longitude"):
+            rate, error = one.rate, one.rate_error
             same = any(abs(float(rate - k.value)) <= 5 * math.hypot(error, k.error) for k in known)
             if abs(float(rate)) > 5 * error and not same:
-                names.append(Known("precession", rate, 0.0, f"secular rate of {raw.signal.name}", error))
+                names.append(Known("precession", rate, 0.0, f"secular rate of {one.name}", error))
     return names
-
-
-def _rate(raw: _Raw, clock: EquidistantTimes) -> tuple[Any, float]:
-    slope = raw.found.sum.polynomial[1].real
-    per_second = 2 / clock.length
-    return slope * per_second, raw.found.polynomial_errors[1] * float(per_second)
 
 
 def _largest_rate(dataset: xarray.Dataset) -> float:
@@ -145,76 +147,81 @@ def _largest_rate(dataset: xarray.Dataset) -> float:
     return float(np.nanmax(np.linalg.norm(rates.reshape(len(rates), -1), axis=1), initial=0.0))
 
 
-def _named(raw: _Raw, clock: EquidistantTimes, known: Sequence[Known], faster: bool) -> SignalAnalysis:
-    found, signal = raw.found, raw.signal
-    lines = [
-        replace(_line(raw, clock, known, n), faster=faster)
-        for n in sorted(range(len(raw.frequencies)), key=lambda n: -abs(complex(found.sum.amplitudes[n])))
-    ]
-    rate, rate_error = _rate(raw, clock) if signal.degree > 0 else (None, math.nan)
-    value = found.sum.polynomial[0] if signal.degree >= 0 else None
-    per_sample = 2 * math.pi / float(clock.spacing)
-    return SignalAnalysis(
-        name=signal.name,
-        units=signal.units,
-        real=signal.real,
-        value=value,
-        value_error=found.polynomial_errors[0] if signal.degree >= 0 else math.nan,
-        rate=rate,
-        rate_error=rate_error,
-        lines=tuple(lines),
-        order=found.order,
-        bits=raw.bits,
-        left=found.left,
-        level=raw.factor * found.level,
-        close=tuple(f * per_sample for f in found.close),
-        exhausted=found.exhausted,
-        notes=tuple(_notes(raw, clock, known, lines)),
-        spectrum=raw.spectrum,
+def _labelled(
+    found: SignalAnalysis, clock: EquidistantTimes, known: Sequence[Known], faster: bool, in_body: bool
+) -> SignalAnalysis:
+    """The analysis with labels of its lines, and notes."""
+    lines = [replace(_named(x, found.real, clock, known, in_body), faster=faster) for x in found.lines]
+    blends = sum(
+        abs(line.mismatch) >= 10 * plain.frequency_error
+        for line, plain in zip(lines, found.lines, strict=True)
     )
+    slow = [] if found.rate is None else _slow(known, clock)
+    unfolded = sum(line.unfolded for line in lines)
+    aliases = sum(line.can_be_alias for line in lines)
+    doubtful = sum(line.ambiguous for line in lines)
+    notes = (
+        (
+            found.close,
+            "a residual is closer than a bin to a line or to the secular part: errors include its size, "
+            "a longer run separates it",
+        ),
+        (
+            slow,
+            f"the samples span less than 1.5 turns of {', '.join(k.name for k in slow)}: the secular rate "
+            "may contain part of it",
+        ),
+        (
+            any(math.isinf(line.phase_error) for line in lines),
+            "a line within a third of a bin of Nyquist's frequency: samples show its amplitude times the "
+            "cosine of its phase, and no more; sample more often to separate these",
+        ),
+        (
+            unfolded,
+            f"{unfolded} frequencies lie beyond Nyquist's, and are unfolded through the known ones",
+        ),
+        (
+            blends,
+            f"{blends} lines lie off their labels by more than the residual explains: blends of lines "
+            "closer than a bin; their errors are those distances",
+        ),
+        (
+            aliases,
+            f"{aliases} lines without a label can be aliases of motions faster than Nyquist's frequency: "
+            "sample more often, or at another spacing, to see whether their frequencies stay",
+        ),
+        (
+            doubtful,
+            f"{doubtful} lines fit several combinations: they have the observed frequency, unfolded by none",
+        ),
+    )
+    return replace(found, lines=tuple(lines), notes=tuple(text for holds, text in notes if holds))
 
 
-def _line(raw: _Raw, clock: EquidistantTimes, known: Sequence[Known], n: int) -> SpectralLine:
-    context = clock.context
-    observed, error = raw.frequencies[n], raw.errors[n]
-    amplitude = raw.found.sum.amplitudes[n]
-    real = raw.signal.real
-    if real and observed < 0:
-        observed, amplitude = -observed, context.conj(amplitude)
-    resolution = 2 * math.pi / float(clock.length)
-    place = float(observed), error, known, clock.nyquist
-    blend, in_body = _BLEND * resolution, raw.signal.in_body
+def _named(
+    line: SpectralLine, real: bool, clock: EquidistantTimes, known: Sequence[Known], in_body: bool
+) -> SpectralLine:
+    """A line with its label, unfolded through that."""
+    context, error, resolution = clock.context, line.frequency_error, 2 * math.pi / float(clock.length)
+    place, blend = (float(line.observed), error, known, clock.nyquist), _BLEND * resolution
     name = label(*place, real=real, in_body=in_body, blend=blend, resolution=resolution)
-    frequency = observed + 2 * name.folds * context.pi / clock.spacing
-    phase = context.arg(amplitude) - frequency * clock.middle
+    turn = 2 * context.pi / clock.spacing
+    frequency = line.observed + name.folds * turn
     # turning it by whole turns a sample changes nothing at the samples, but at the middle between two it does
-    if name.folds and clock.count % 2 == 0:
-        phase += context.pi * name.folds
+    half = context.pi * name.folds if clock.count % 2 == 0 else 0
+    phase = line.phase - name.folds * turn * clock.middle + half
     if real and frequency < 0:
         frequency, phase, name = -frequency, -phase, reversed_label(name, known)
     mismatch = math.nan
     if name.multipliers:
-        combined = sum(
-            (m * context.mpf(k.value) for m, k in zip(name.multipliers, known, strict=True)), context.zero
-        )
-        turn = 2 * context.pi / clock.spacing
-        off = frequency - combined
+        terms = (m * context.mpf(k.value) for m, k in zip(name.multipliers, known, strict=True))
+        off = frequency - sum(terms, context.zero)
         mismatch = float(off - turn * context.nint(off / turn))
         if not name.doubtful:
             error = max(error, abs(mismatch))  # a blend of lines that are too close to be separated
-    size = abs(complex(amplitude))
-    held = at_nyquist(raw.found.sum, real)[n]
-    amplitude_error = raw.found.amplitude_errors[n]
-    return SpectralLine(
-        frequency=frequency,
-        observed=observed,
-        frequency_error=error,
-        amplitude=raw.factor * abs(amplitude),
-        amplitude_error=raw.factor * amplitude_error,
-        phase=_wrapped(context, phase),
-        phase_error=amplitude_error / size if size and not held else math.inf,
-        label=name,
-        mismatch=mismatch,
+    phase = _wrapped(context, phase)
+    return replace(
+        line, frequency=frequency, frequency_error=error, phase=phase, label=name, mismatch=mismatch
     )
 
 
@@ -228,49 +235,3 @@ def _slow(known: Sequence[Known], clock: EquidistantTimes) -> list[Known]:
     """Known frequencies of which the samples span less than 1.5 turns."""
     most = 2 * math.pi * 1.5 / float(clock.length)
     return [k for k in known if k.name != "precession" and 0 < abs(float(k.value)) < most]
-
-
-def _notes(
-    raw: _Raw, clock: EquidistantTimes, known: Sequence[Known], lines: Sequence[SpectralLine]
-) -> list[str]:
-    notes = []
-    if raw.found.close:
-        notes.append(
-            "a residual is closer than a bin to a line or to the secular part: errors include its size, "
-            "a longer run separates it"
-        )
-    slow = _slow(known, clock)
-    if slow and raw.signal.degree > 0:
-        names = ", ".join(k.name for k in slow)
-        notes.append(
-            f"the samples span less than 1.5 turns of {names}: the secular rate may contain part of it"
-        )
-    if any(at_nyquist(raw.found.sum, raw.signal.real)):
-        notes.append(
-            "a line within a third of a bin of Nyquist's frequency: samples show its amplitude times the "
-            "cosine of its phase, and no more; sample more often to separate these"
-        )
-    unfolded = [line for line in lines if line.unfolded]
-    if unfolded:
-        notes.append(
-            f"{len(unfolded)} frequencies lie beyond Nyquist's, and are unfolded through the known ones"
-        )
-    blends = [line for line in lines if abs(line.mismatch) >= 10 * raw.finest(line)]
-    if blends:
-        notes.append(
-            f"{len(blends)} lines lie off their labels by more than the residual explains: blends of lines "
-            "closer than a bin; their errors are those distances"
-        )
-    aliases = sum(line.can_be_alias for line in lines)
-    if aliases:
-        notes.append(
-            f"{aliases} lines without a label can be aliases of motions faster than Nyquist's frequency: "
-            "sample more often, or at another spacing, to see whether their frequencies stay"
-        )
-    doubtful = [line for line in lines if line.ambiguous]
-    if doubtful:
-        notes.append(
-            f"{len(doubtful)} lines fit several combinations: they have the observed frequency, "
-            "unfolded by none"
-        )
-    return notes
