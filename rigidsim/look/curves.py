@@ -10,11 +10,11 @@ import xarray
 
 from rigidsim.look import gyrostats, signals, sources
 from rigidsim.look.fits import secular
-from rigidsim.look.plots import XYZ, Plot, drift_plot, uncertain, variable_plot
+from rigidsim.look.plots import XYZ, Plot, by_unit, drift_plot, uncertain, variable_plot
 from rigidsim.look.record import scene_of
+from rigidsim.look.signals import clock
 from rigidsim.look.solids import Array
-from rigidsim.look.units import angle_text, clock, scaled, turning_text
-from rigidsim.scene.readable import DAY, named_unit
+from rigidsim.scene.readable import DAY, angle_text, named_unit, scaled, turning_text
 
 Curve = Callable[[xarray.Dataset], Plot | None]
 Found = Array | tuple[Array, dict[str, Any]] | None
@@ -332,14 +332,12 @@ def own_states(place: int) -> Curve:
 
     def found(dataset: xarray.Dataset) -> Found:
         own = [v for v in dataset.data_vars.values() if v.attrs.get("given_by") == "[[states]]"]
-        units = list(dict.fromkeys(str(v.attrs.get("units", "1")) for v in own))[place : place + 1]
-        shown = [v for v in own if [v.attrs.get("units", "1")] == units]
-        if not shown:
+        groups = [*by_unit(own).items()]
+        if place >= len(groups):
             return None
-        labels = [str(v.name) for v in shown]
-        title = "Own states" if len(shown) > 1 else f"Own state {labels[0]}"
-        table = np.stack([np.asarray(v.values, dtype=np.float64) for v in shown], axis=1)
-        return table, {"title": title, "labels": labels, "of": units[0]}
+        unit, columns = groups[place]
+        title = "Own states" if len(columns) > 1 else f"Own state {next(iter(columns))}"
+        return np.stack([*columns.values()], axis=1), {"title": title, "labels": [*columns], "of": unit}
 
     return row(f"own states {place}", "", found, word="value", begins=True)
 

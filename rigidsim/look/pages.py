@@ -11,8 +11,7 @@ from rigidsim.look.fits import circulation, secular
 from rigidsim.look.record import read_config, scene_of
 from rigidsim.look.signals import title_of
 from rigidsim.look.solids import Array
-from rigidsim.look.units import angle_text, turning_text
-from rigidsim.scene.readable import TimeWords, span_text
+from rigidsim.scene.readable import TimeWords, angle_text, span_text, turning_text
 
 Names = list[str]
 _STEADY = 0.3  # of the largest rate, above which a body is said to turn at its mean rate

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import xarray
@@ -11,8 +12,7 @@ from rigidsim.look.curves import precesses
 from rigidsim.look.record import scene_of
 from rigidsim.look.solids import Array
 from rigidsim.look.states import events_of
-from rigidsim.look.units import angle_scale, angle_text, scaled, with_unit
-from rigidsim.scene.readable import si_scale, span_text
+from rigidsim.scene.readable import angle_text, scaled, span_text, with_unit
 
 _TURN = 2 * np.pi
 _SMALL = 0.05  # rad: sines of smaller angles read as angles
@@ -63,6 +63,16 @@ class Path:
 Find = Callable[[xarray.Dataset], Path | None]
 
 
+def planar(
+    name: str, title: str, plane: Array, across: str, up: str, *, of: str = "rad",
+    others: Mapping[str, Array] | None = None, **options: Any,
+) -> Path:  # fmt: skip
+    """The path of a point of a plane (rows, 2), with others, in the unit that suits it."""
+    divisor, unit = scaled(plane, of)
+    beside = {key: path / divisor for key, path in (others or {}).items()}
+    return Path(name, title, plane / divisor, across, up, unit, others=beside, **options)
+
+
 def once_round(dataset: xarray.Dataset, plane: Array, digits: int) -> str:
     """Words on the period and the sense in which a point goes round the origin; empty if it doesn't."""
     mean = fits.circulation(signals.seconds(dataset), plane)
@@ -77,58 +87,50 @@ def polar_motion(dataset: xarray.Dataset) -> Path | None:
     plane = signals.polar_motion(dataset) if signals.near_axis(dataset) else None
     if plane is None:
         return None
-    scale, unit = angle_scale(plane)
-    sparse = signals.wobble_aliased(dataset)
-    radius = signals.norms(plane)
+    sparse, radius = signals.wobble_aliased(dataset), signals.norms(plane)
     least, most = float(np.nanmin(radius)), float(np.nanmax(radius))
-    title = "Polar motion" + ("" if sparse else once_round(dataset, plane, 5)) + ", "
-    title += f"{angle_text(least, like=most)} to " if most - least > 1e-3 * most else ""
-    title += angle_text(most)
-    points = plane / scale
-    return Path("polar_motion", title, points, "m₁", "m₂", unit, "pink", "figure axis", sparse=sparse)
+    reach = f"{angle_text(least, like=most)} to " if most - least > 1e-3 * most else ""
+    words = "" if sparse else once_round(dataset, plane, 5)
+    title = f"Polar motion{words}, {reach}{angle_text(most)}"
+    return planar("polar_motion", title, plane, "m₁", "m₂", hue="pink", center="figure axis", sparse=sparse)
 
 
 def pole_path(dataset: xarray.Dataset) -> Path | None:
     """Path of the figure axis in space, seen from outside along the pole that it circles: of a free body the
     momentum, else the reference plane's. Distances from the centre are angles.
     """
-    along, paths = signals.steady_momentum(dataset), {}
-    names, center, title = ("along X", "along Y"), "reference pole", "Path of the pole in space"
+    along = signals.steady_momentum(dataset)
     if along is not None:
-        names, center = ("across the momentum",) * 2, "momentum"
-        title = "Path of the figure axis in space"
-        first, second = signals.across(along)
-        for name in ("figure", "spin", "core"):
-            axis = signals.pole(dataset, name)
-            if axis is not None:
-                paths[name] = flat(axis @ first, axis @ second, axis @ along)
+        frame = np.stack([*signals.across(along), along], axis=1)
+        axes = {name: signals.pole(dataset, name) for name in ("figure", "spin", "core")}
+        paths = {name: flat(axis @ frame) for name, axis in axes.items() if axis is not None}
+        title, names, center = "the figure axis", ("across the momentum",) * 2, "momentum"
     else:
-        for name in ("figure", "momentum"):
-            found = signals.orientation(dataset, name)
-            if found is not None:
-                tilt, node = found
-                paths[name] = np.stack([tilt * np.sin(node), -tilt * np.cos(node)], axis=1)
+        found = {name: signals.orientation(dataset, name) for name in ("figure", "momentum")}
+        paths = {
+            name: pair[0][:, None] * np.stack([np.sin(pair[1]), -np.cos(pair[1])], axis=1)
+            for name, pair in found.items()
+            if pair is not None
+        }
+        title, names, center = "the pole", ("along X", "along Y"), "reference pole"
     if not paths:
         return None
-    leading, *rest = paths
-    shown = paths[leading]
+    shown = next(iter(paths.values()))
     reach = max(float(np.nanmax(np.abs(shown - np.nanmean(shown, axis=0)))), 1e-300)
-    others = {n: paths[n] for n in rest if not np.nanmax(np.abs(paths[n] - shown)) < _SAME * reach}
+    others = {f"{n} axis": p for n, p in paths.items() if not np.nanmax(np.abs(p - shown)) < _SAME * reach}
+    sparse = along is not None and signals.aliased(dataset)
+    title = f"Path of {title} in space" + ("" if sparse else once_round(dataset, shown, 4))
     if np.nanmin(signals.norms(shown)) > 3 * reach:  # so far that it would press the path flat
         center = ""
-    scale, unit = angle_scale(shown)
-    sparse = along is not None and signals.aliased(dataset)
-    title += "" if sparse else once_round(dataset, shown, 4)
-    others = {f"{name} axis": path / scale for name, path in others.items()}
-    return Path("pole_path", title, shown / scale, *names, unit, "blue", center, others, sparse=sparse)
+    return planar("pole_path", title, shown, *names, center=center, others=others, sparse=sparse)
 
 
-def flat(x: Array, y: Array, z: Array) -> Array:
-    """Directions (rows,) each as points (rows, 2) whose distance from the centre is the angle from z, rad."""
-    plane = np.stack([x, y], axis=1)
+def flat(directions: Array) -> Array:
+    """Directions (rows, 3) as points (rows, 2) whose distance from the centre is the angle from z, rad."""
+    plane = directions[:, :2]
     size = signals.norms(plane)
-    ratio = np.divide(np.arctan2(size, z), size, out=np.ones_like(size), where=size > 1e-12)
-    return np.asarray(plane * ratio[:, None])
+    angle = np.arctan2(size, directions[:, 2])
+    return plane * np.divide(angle, size, out=np.ones_like(size), where=size > 1e-12)[:, None]
 
 
 def nutation(dataset: xarray.Dataset) -> Path | None:
@@ -143,30 +145,27 @@ def nutation(dataset: xarray.Dataset) -> Path | None:
     path = np.stack([(node - fits.secular(seconds, node).at(seconds)) * np.sin(mean), tilt - mean], axis=1)
     if not 0 < np.nanmax(signals.norms(path)) < _FAR:
         return None
-    ellipse, (scale, unit) = fits.leading_ellipse(seconds, node, tilt, float(np.sin(mean))), angle_scale(path)
-    drawn = None
+    ellipse, drawn = fits.leading_ellipse(seconds, node, tilt, float(np.sin(mean))), None
     if ellipse is not None:
         long, short = (angle_text(size, 3) for size in ellipse.semi_axes)
         words = f"{span_text(_TURN / ellipse.rate, 3)}: semi-axes {long}, {short}"
-        drawn = ellipse.curve() / scale, words
+        drawn = ellipse.curve() / scaled(path, "rad")[0], words
     title, labels = "Nutation: the pole about its mean motion", ("Δlongitude · sin(obliquity)", "Δobliquity")
-    return Path("nutation", title, path / scale, *labels, unit, ellipse=drawn)
+    return planar("nutation", title, path, *labels, ellipse=drawn)
 
 
 def tip(dataset: xarray.Dataset) -> Path | None:
     """A top's tip, recorded or the end of the unit figure axis, seen from above."""
-    points, what, unit = signals.values(dataset, "tip", 3), "Tip", "m"
+    up, points, what, unit = scene_of(dataset).vertical, signals.values(dataset, "tip", 3), "Tip", "m"
     if points is None:
         points, what, unit = signals.pole(dataset, "figure"), "Figure axis", ""
     if points is None or not signals.is_top(dataset):
         return None
-    up = scene_of(dataset).vertical
     plane = points @ _in_plane(up)
-    scale, unit = si_scale(plane, unit) if unit else (1.0, "")
-    if what != "Tip" and np.nanmax(np.abs(plane)) < _SMALL:  # components of a unit vector are angles
-        scale, unit = angle_scale(plane)
+    if not unit and np.nanmax(np.abs(plane)) < _SMALL:  # components of a unit vector are angles
+        unit = "rad"
     names = ("X", "Y") if np.allclose(up, [0, 0, 1]) else ("across", "across")
-    return Path("tip", f"{what}, seen from above", plane / scale, *names, unit, center="vertical")
+    return planar("tip", f"{what}, seen from above", plane, *names, of=unit, center="vertical")
 
 
 def nadir(dataset: xarray.Dataset) -> Path | None:
@@ -175,14 +174,12 @@ def nadir(dataset: xarray.Dataset) -> Path | None:
     if directions is None:
         return None
     mean = np.nanmean(directions, axis=0)
-    k = int(np.abs(mean).argmax())
+    k, names = int(np.abs(mean).argmax()), "xyz"
+    sign, facing = ("", 1.0) if mean[k] > 0 else ("−", -1.0)
     i, j = (k + 1) % 3, (k + 2) % 3
-    plane = flat(*(directions[:, [i, j, k]] * np.sign(mean[k])).T)
-    scale, unit = angle_scale(plane)
-    sign = "" if mean[k] > 0 else "−"
-    across, up = (f"towards {sign}{'xyz'[axis]}" for axis in (i, j))
-    center = f"{sign}{'xyz'[k]} axis"
-    return Path("nadir", "The source seen from the body", plane / scale, across, up, unit, center=center)
+    across, up = (f"towards {sign}{names[axis]}" for axis in (i, j))
+    plane, center = flat(facing * directions[:, [i, j, k]]), f"{sign}{names[k]} axis"
+    return planar("nadir", "The source seen from the body", plane, across, up, center=center)
 
 
 def sub_source(dataset: xarray.Dataset) -> Path | None:
@@ -190,20 +187,19 @@ def sub_source(dataset: xarray.Dataset) -> Path | None:
     found = sources.seen(dataset)
     if found is None or not np.isfinite(found.directions).all() or not found.stays():
         return None
-    plane = found.coordinates(scene_of(dataset).figure)
-    scale, unit = angle_scale(plane)
-    title = f"Sub-{found.body.name if found.body else 'source'} point"
-    return Path("sub_source", title, plane / scale, "longitude", "latitude", unit, "orange", "zero")
+    title, plane = (
+        f"Sub-{found.body.name if found.body else 'source'} point",
+        found.coordinates(scene_of(dataset).figure),
+    )
+    return planar("sub_source", title, plane, "longitude", "latitude", hue="orange", center="zero")
 
 
 def herpolhode(dataset: xarray.Dataset) -> Path | None:
     """The tip of the angular velocity on the invariable plane, seen along the momentum."""
-    plane = herpolhode_plane(dataset)
+    plane, title = herpolhode_plane(dataset), "Herpolhode on the invariable plane"
     if plane is None:
         return None
-    scale, unit = si_scale(plane, "rad/s")
-    title = "Herpolhode on the invariable plane"
-    return Path("herpolhode", title, plane / scale, "across L", "across L", unit, center="L")
+    return planar("herpolhode", title, plane, "across L", "across L", of="rad/s", center="L")
 
 
 def herpolhode_plane(dataset: xarray.Dataset) -> Array | None:
@@ -220,7 +216,7 @@ def flight(dataset: xarray.Dataset) -> Path | None:
     position, scene = signals.values(dataset, "position", 3), scene_of(dataset)
     if position is None:
         return None
-    (scale, unit), up = si_scale(position - position[0], "m"), scene.vertical
+    (scale, unit), up = scaled(position - position[0], "m"), scene.vertical
     if scene.gravity is not None and not scene.attractors:
         level = position - np.outer(position @ up, up)
         way = level[-1] - level[0]
@@ -260,22 +256,22 @@ def sections(dataset: xarray.Dataset) -> list[Path]:
     """For each frequent event, two components recorded there, as points."""
     found = []
     for event in events_of(dataset):
-        for name in _SECTIONS:
-            full = f"{event}_{name}"
-            table = np.asarray(dataset[full].values, dtype=float) if full in dataset else np.zeros(0)
-            if table.ndim != 2 or len(table := signals.finite_rows(table)) < _SECTION_POINTS:
-                continue
-            one, other = sorted(np.argsort(np.ptp(table, axis=0))[-2:])
-            dimension = str(dataset[full].dims[1])
+        recorded = (dataset[f"{event}_{name}"] for name in _SECTIONS if f"{event}_{name}" in dataset)
+        tables = (
+            (one, signals.finite_rows(np.asarray(one.values, dtype=float)))
+            for one in recorded
+            if one.ndim == 2
+        )
+        for variable, table in [pair for pair in tables if len(pair[1]) >= _SECTION_POINTS][:1]:
+            both = sorted(np.argsort(np.ptp(table, axis=0))[-2:])
+            dimension = str(variable.dims[1])
             labels = dataset[dimension].values if dimension in dataset else np.arange(table.shape[1])
-            divisor, unit = scaled(table, str(dataset[full].attrs.get("units", "")))
+            divisor, unit = scaled(table, str(variable.attrs.get("units", "")))
             # the origin is their middle, which the names say: a small section would be a dot far off
-            points = table[:, [one, other]] / divisor
+            points = table[:, both] / divisor
             middle = (points.min(axis=0) + points.max(axis=0)) / 2
-            across, up = (f"{labels[k]} − {at:.4g}" for k, at in zip((one, other), middle, strict=True))
-            title = f"Section at {event}: {name.replace('_', ' ')}"
-            found.append(
-                Path(f"section_{event}", title, points - middle, across, up, unit, "orange", moves=False)
-            )
-            break
+            across, up = (f"{labels[k]} − {at:.4g}" for k, at in zip(both, middle, strict=True))
+            title = f"Section at {event}: {str(variable.name).removeprefix(f'{event}_').replace('_', ' ')}"
+            options: dict[str, Any] = {"hue": "orange", "moves": False}
+            found.append(Path(f"section_{event}", title, points - middle, across, up, unit, **options))
     return found

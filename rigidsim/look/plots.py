@@ -1,6 +1,6 @@
 """What is drawn over time, as values with labels, a unit and colours: one form for figures and timelines."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,7 +9,7 @@ import xarray
 
 from rigidsim.look.signals import in_words, is_averaged
 from rigidsim.look.solids import Array, Color
-from rigidsim.look.units import scaled, with_unit
+from rigidsim.scene.readable import scaled, with_unit
 
 HUES: dict[str, tuple[str, Color]] = {
     "red": ("#d1495b", (235, 97, 89)),
@@ -116,36 +116,21 @@ def drift_plot(dataset: xarray.Dataset) -> Plot | None:
     """Magnitudes of all relative drifts, and of corrections by projection, over the band that rounding
     explains; None without any.
     """
-    columns, labels = [], []
-    for variable in _along_time(dataset):
+    columns = {}
+    for variable, table in _along_time(dataset):
         drifting, projected = (variable.attrs.get(role) for role in ("drift_of", "put_back_of"))
         if drifting or projected:
-            size = np.abs(_table(variable)).max(axis=1)
+            size = np.abs(table).max(axis=1)
             name = in_words(str(drifting)) if drifting else f"correction of {in_words(str(projected))}"
-            labels.append(name if (size > 0).any() else f"{name}: exactly 0")
-            columns.append(np.where(size > 0, size, np.nan))
+            columns[name if (size > 0).any() else f"{name}: exactly 0"] = np.where(size > 0, size, np.nan)
     if not columns:
         return None
-    error, levels = float(dataset.attrs.get("attitude_error", 0.0)), {}
-    if np.isfinite(error) and error > 0:
-        what = "axis" if is_averaged(dataset.attrs) else "attitude"
-        levels = {f"error of the {what} at the end, rad": error}
-    band, law = None, rounding_law(dataset)
-    if law is not None:
-        band = TYPICAL * law, MOST * law
-    title = "Drift of invariants"
-    table = np.stack(columns, axis=1)
-    return Plot(
-        "drift",
-        title,
-        table,
-        labels,
-        word="relative drift",
-        place="drift",
-        log=True,
-        levels=levels,
-        band=band,
-    )
+    error, law = float(dataset.attrs.get("attitude_error", 0.0)), rounding_law(dataset)
+    what = "axis" if is_averaged(dataset.attrs) else "attitude"
+    levels = {f"error of the {what} at the end, rad": error} if np.isfinite(error) and error > 0 else {}
+    band, table = None if law is None else (TYPICAL * law, MOST * law), np.stack([*columns.values()], axis=1)
+    options: dict[str, Any] = {"word": "relative drift", "place": "drift", "log": True}
+    return Plot("drift", "Drift of invariants", table, [*columns], levels=levels, band=band, **options)
 
 
 def rounding_law(dataset: xarray.Dataset) -> Array | None:
@@ -163,45 +148,45 @@ def other_plots(dataset: xarray.Dataset, shown: Sequence[str]) -> list[Plot]:
 
     A new observable or invariant needs no line anywhere.
     """
-    plots: list[Plot] = []
-    scalars: dict[str, list[xarray.DataArray]] = {}
-    for variable in _along_time(dataset):
-        name, unit = str(variable.name), str(variable.attrs.get("units", ""))
-        if name in shown or {"drift_of", "put_back_of", "covariance_of"} & set(variable.attrs):
-            continue
-        if variable.ndim == 1:
-            scalars.setdefault(unit, []).append(variable)
-        else:
-            plots.append(variable_plot(dataset, variable))
-    for unit, found in scalars.items():
-        table = np.stack([_table(one)[:, 0] for one in found], axis=1)
+    roles = {"drift_of", "put_back_of", "covariance_of"}
+    left = [v for v, _ in _along_time(dataset) if str(v.name) not in shown and not roles & set(v.attrs)]
+    plots = [variable_plot(dataset, variable) for variable in left if variable.ndim > 1]
+    for unit, columns in by_unit([variable for variable in left if variable.ndim == 1]).items():
+        table, labels = np.stack([*columns.values()], axis=1), [name.replace("_", " ") for name in columns]
         divisor, shown_unit = scaled(table, unit)
-        labels = [str(one.name).replace("_", " ") for one in found]
         title = labels[0][:1].upper() + labels[0][1:]
         plots.append(Plot(f"scalars {unit}", title, table / divisor, labels, shown_unit, place="more"))
     return plots
 
 
+def by_unit(scalars: Iterable[xarray.DataArray]) -> dict[str, dict[str, Array]]:
+    """Columns (rows,) of scalars along time by their unit and name."""
+    found: dict[str, dict[str, Array]] = {}
+    for one in scalars:
+        column = np.asarray(one.values, dtype=np.float64)
+        found.setdefault(str(one.attrs.get("units", "")), {})[str(one.name)] = column
+    return found
+
+
 def variable_plot(dataset: xarray.Dataset, variable: xarray.DataArray, place: str = "more") -> Plot:
     """The plot of one recorded variable, with the labels of its components."""
     name, table = str(variable.name), _table(variable)
-    count = table.shape[1]
     dimension = str(variable.dims[1]) if variable.ndim == 2 else ""
-    named = variable.coords[dimension].values[:count] if dimension in variable.coords else range(count)
-    labels = [str(label) for label in named] if variable.ndim > 1 else [""]
+    named = variable.coords[dimension].values if dimension in variable.coords else range(table.shape[1])
+    labels = [str(label) for label in named[: table.shape[1]]] if variable.ndim > 1 else [""]
     hues = XYZ if dimension in ("body_axis", "space_axis") else PALETTE
     divisor, unit = scaled(table, str(variable.attrs.get("units", "")))
-    title = name[:1].upper() + name[1:].replace("_", " ")
-    if "angle" in variable.attrs and "angles_wrapped_from" in dataset.attrs:
-        title += " within one turn"
+    wrapped = "angle" in variable.attrs and "angles_wrapped_from" in dataset.attrs
+    title = name[:1].upper() + name[1:].replace("_", " ") + (" within one turn" if wrapped else "")
     return Plot(name, title, table / divisor, labels, unit, hues, place=place, recorded=divisor)
 
 
-def _along_time(dataset: xarray.Dataset) -> Iterator[xarray.DataArray]:
+def _along_time(dataset: xarray.Dataset) -> Iterator[tuple[xarray.DataArray, Array]]:
     # Angles before quaternions, because people read them; the rest as recorded.
-    names = sorted(map(str, dataset.data_vars), key=lambda name: name != "euler_angles")
-    along = (dataset[name] for name in names if "time" in dataset[name].dims)
-    yield from (one.transpose("time", ...) for one in along if one.dtype.kind in "fiub")
+    for name in sorted(map(str, dataset.data_vars), key=lambda name: name != "euler_angles"):
+        if "time" in dataset[name].dims and dataset[name].dtype.kind in "fiub":
+            variable = dataset[name].transpose("time", ...)
+            yield variable, _table(variable)
 
 
 def _table(variable: xarray.DataArray) -> Array:

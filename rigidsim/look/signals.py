@@ -12,6 +12,8 @@ import xarray
 
 from rigidsim.look.record import read_config, scene_of
 from rigidsim.look.solids import Array, rotation_matrix
+from rigidsim.scene.epochs import J2000
+from rigidsim.scene.readable import YEAR, TimeUnit, epoch_of, julian_year, unit_of
 from rigidsim.scene.space_axes import CELESTIAL, EQUATOR, obliquity, to_equator
 
 _ORBIT_NORM = re.compile(r"orbit_norm_(\d+)")
@@ -22,6 +24,7 @@ _ALIKE_PLANES = 1e-5  # between unit normals of planes that have one name
 _DEFINING = {
     "momentum": "angular_momentum", "spin": "angular_velocity", "core": "core_angular_velocity"
 }  # fmt: skip
+_SOME_MINUTES = 300.0  # s, up to which a clock counts seconds
 _STEADY = 1e-6  # a momentum that turns by less is fixed
 _SPREAD = 1e-5  # of the energy, up to which it counts as constant: more than rounding in single precision
 
@@ -53,6 +56,21 @@ def values(dataset: xarray.Dataset, name: str, width: int | None = None) -> Arra
 def seconds(dataset: xarray.Dataset) -> Array:
     """Sample times (rows,), s."""
     return np.asarray(dataset["time"].values, dtype=np.float64)
+
+
+def clock(dataset: xarray.Dataset) -> tuple[Array, TimeUnit, str]:
+    """Sample times as an axis shows them, their unit, and its label: years of the calendar, or time, in
+    seconds up to five minutes unless the config has a unit.
+    """
+    times, epoch = seconds(dataset), epoch_of(dataset.attrs)
+    span = max(abs(float(times[0])), abs(float(times[-1])))
+    unit = unit_of(dataset.attrs, span if span > _SOME_MINUTES else min(span, 1.0))
+    time = times / unit.seconds
+    if epoch is None:
+        return time, unit, f"time [{unit.symbol}]"
+    if unit.seconds == YEAR:
+        return time + julian_year(epoch), unit, f"year ({epoch.uniform().scale})"
+    return time, unit, f"time since {'J2000' if epoch == J2000 else epoch} [{unit.symbol}]"
 
 
 def principal_rates(dataset: xarray.Dataset) -> Array | None:

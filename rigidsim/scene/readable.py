@@ -6,6 +6,7 @@ A config's ``[time] unit`` and ``epoch`` are stored in the dataset's attributes 
 """
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
@@ -197,6 +198,8 @@ ANGLE_UNITS: dict[str, AngleUnit] = {
 _MANY_TURNS = 20 * math.pi
 _SMALL = math.radians(0.1)  # 6'
 _TINY = math.radians(0.1 / 3600)
+_SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+_PREFIXED = ("rad/s", "m", "m/s")
 _PREFIXES = {0: "", -3: "m", -6: "µ", -9: "n", -12: "p", -15: "f", 3: "k", 6: "M", 9: "G", 12: "T"}
 
 
@@ -221,12 +224,67 @@ def largest(values: Array) -> float:
     return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
-def si_scale(values: Array, unit: str) -> tuple[float, str]:
-    """Divisor and prefixed unit for values of a plain SI unit such as m or rad/s."""
-    size = largest(values)
-    if size == 0 or 0.1 <= size < 1e3:
+def scaled(values: Array, unit: str, attributes: Mapping[str, Any] | None = None) -> tuple[float, str]:
+    """Divisor and name of the unit in which values read best: prefixes for rates and lengths, degrees,
+    arcseconds, mas and less for angles, and with a run's attributes its unit of time: for times, and for
+    rates, which are then angles a day or a year.
+    """
+    unit, size = pretty_unit(unit), largest(values)
+    if unit == "rad":
+        return _angle_scale(size)
+    if attributes is not None and unit in ("s", "rad/s"):
+        time = unit_of(attributes, size if unit == "s" else 0.0)
+        if unit == "s":
+            return time.seconds, time.symbol
+        if time.seconds >= DAY:
+            divisor, name = _angle_scale(size * time.seconds)
+            return divisor / time.seconds, f"{name}/{time.symbol}"
+    if unit not in _PREFIXED or size == 0 or 0.1 <= size < 1e3:
         return 1.0, unit
     exponent = 3 * math.floor(math.log10(size) / 3 + 1e-9)
-    if exponent in _PREFIXES:
-        return 10.0**exponent, _PREFIXES[exponent] + unit
-    return 10.0**exponent, f"1e{exponent} {unit}"
+    return 10.0**exponent, _PREFIXES.get(exponent, f"1e{exponent} ") + unit
+
+
+def _angle_scale(size: float) -> tuple[float, str]:
+    """Divisor and unit for angles in rad: deg, arcsec and mas as in tables, and µas and less below."""
+    unit = angle_unit(min(size, 1.0))  # not in turns
+    if unit.name != "mas" or size * unit.per_radian >= 0.1:
+        return 1 / unit.per_radian, unit.name
+    exponent = 3 * math.floor(math.log10(size * unit.per_radian) / 3 + 1e-9)
+    return 10.0**exponent / unit.per_radian, {-3: "µas", -6: "nas"}.get(exponent, f"1e{exponent} mas")
+
+
+def pretty_unit(unit: str) -> str:
+    """A unit as people write it: `kg m2 s-1` (UDUNITS) and `kg m^2/s` both give `kg m²/s`."""
+    parts: tuple[list[str], list[str]] = [], []
+    for n, part in enumerate(unit.split("/")):
+        for base, power in re.findall(r"([^\W\d_]+|1)\^?(-?\d+)?", part):
+            exponent = int(power or 1) * (-1 if n else 1)
+            digits = str(abs(exponent)).translate(_SUPERSCRIPTS) if abs(exponent) != 1 else ""
+            if base != "1":
+                parts[exponent < 0].append(base + digits)
+    above, below = parts
+    return "/".join([" ".join(above) or ("1" if below else ""), *below])
+
+
+def with_unit(text: str, unit: str) -> str:
+    """A name and a unit of ``scaled``; without a unit the name alone."""
+    return f"{text} [{unit}]" if unit else text
+
+
+def angle_text(value: float, digits: int = 4, *, like: float | None = None) -> str:
+    """An angle in rad with its unit, or another's unit: ``206.3 mas``, ``23.44°``."""
+    divisor, unit = _angle_scale(abs(value if like is None else like))
+    symbol = ANGLE_UNITS[unit].symbol if unit in ANGLE_UNITS else unit
+    return f"{typeset(value / divisor, digits)}{'' if symbol in '°″' else ' '}{symbol}"
+
+
+def turning_text(rate: float) -> str:
+    """A rate (rad/s) as turns per unit of time, chosen so that the number isn't tiny: ``0.6702 turns/s``."""
+    unit = unit_for(40 * math.pi / rate if rate else 0.0)
+    return f"{typeset(rate * unit.seconds / (2 * math.pi))} turns/{unit.symbol}"
+
+
+def typeset(value: float, digits: int = 4) -> str:
+    """A number as ``number_text``, with a true minus sign."""
+    return number_text(value, digits).replace("-", "−")

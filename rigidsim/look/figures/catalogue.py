@@ -28,8 +28,8 @@ from rigidsim.look.figures.panels import PLANES, Panel, draw
 from rigidsim.look.figures.style import GREY, INK, PALE, STYLE, blank
 from rigidsim.look.pages import leading, numbers
 from rigidsim.look.plots import HUES, Plot, moves, paper, screen
+from rigidsim.look.signals import clock
 from rigidsim.look.thinning import thin
-from rigidsim.look.units import clock
 from rigidsim.scene.parts_of_values import in_time_order
 from rigidsim.scene.readable import span_text, unit_for
 
@@ -38,7 +38,6 @@ ROWS = 20_000  # that a figure draws
 _TELLING = 0.5  # changes of sign to a sample: four samples a swing
 _CYCLES, _MANY = 14, 60  # swings shown of the start, where there are more than so many
 _NAME = 30  # letters that a name in the table has room for
-_BANDS = 400  # parts of a panel's width, each with the least and the largest value in it
 _CURVE, _PLANE, _FACT = 2.55, 4.7, 0.235  # heights, inches
 _WIDE, _NARROW = 12.4, 8.2
 _PLANES_WIDE = 5.2  # width of a plane where only planes stand side by side
@@ -154,10 +153,9 @@ def _curve_panel(
     begins = shown.begins(name, plot)
     parts = place.subgridspec(1, 2, width_ratios=[1.7, 1.0], wspace=0.03) if begins else [place]
     whole = figure.add_subplot(parts[0])
-    draw(whole, shown.rows, plot)
+    draw(whole, shown.rows, plot, dense=begins > 0)
     time_axis(whole, shown.rows, labelled=lowest or begins > 0)
     if begins:
-        _as_band(whole)
         first = figure.add_subplot(parts[1])
         shown.draw_first(first, name, begins)
         first.set(ylabel="")
@@ -173,21 +171,6 @@ def time_axis(axes: Axes, dataset: xarray.Dataset, *, labelled: bool) -> None:
         axes.set_xlim(time[0], time[-1])
     axes.tick_params(labelbottom=labelled)
     axes.set_xlabel(label if labelled else "")
-
-
-def _as_band(axes: Axes) -> None:
-    """Replace curves that are denser than the panel by the band between their extremes."""
-    for line in list(axes.get_lines()):
-        x, y = (np.asarray(values, dtype=np.float64) for values in (line.get_xdata(), line.get_ydata()))
-        per_part = len(x) // _BANDS
-        if per_part < 4:
-            continue
-        parts = np.arange(0, len(x), per_part)
-        low, high = np.fmin.reduceat(y, parts), np.fmax.reduceat(y, parts)
-        places = np.append(x[parts[:-1]], x[-1]) if len(parts) > 1 else x[parts]
-        color = line.get_color()
-        axes.fill_between(places, low, high, color=color, alpha=0.35, lw=0.6)
-        line.set(visible=False)
 
 
 def _table(axes: Axes, lines: list[tuple[str, str]]) -> None:

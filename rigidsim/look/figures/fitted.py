@@ -23,7 +23,7 @@ from rigidsim.look.figures.style import (
     square,
     styled,
 )  # fmt: skip
-from rigidsim.look.units import angle_scale, scaled
+from rigidsim.scene.readable import scaled
 
 _MOST_SETS = 4
 _WITHIN_95 = np.sqrt(-2 * np.log(0.05))  # sigmas of an ellipse that holds 95 % of a plane normal distribution
@@ -149,7 +149,7 @@ def _pole(axes: Axes, dataset: xarray.Dataset, unit: str, length: float) -> None
         why = "unbounded, by undetermined parameters" if unbounded else "none of the parameters moves it"
         axes.set_title(f"pole: {why}")
         return
-    divisor, name = angle_scale(np.sqrt(sizes[[first, best, last]]))
+    divisor, name = scaled(np.sqrt(sizes[[first, best, last]]), "rad")
     turn = np.linspace(0, 2 * np.pi, 181)
     circle, drawn = np.stack([np.cos(turn), np.sin(turn)], axis=1) / divisor, []
     for index, color in {first: ORANGE, last: BLUE, best: Y}.items():

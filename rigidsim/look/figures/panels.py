@@ -14,33 +14,42 @@ from rigidsim.look.figures.style import INK, Z, curve, key, square, titled
 from rigidsim.look.paths import PATHS, Path
 from rigidsim.look.plots import Plot, paper
 from rigidsim.look.record import scene_of
-from rigidsim.look.units import angle_scale, clock, with_unit
-from rigidsim.scene.readable import si_scale
+from rigidsim.look.signals import clock
+from rigidsim.scene.readable import scaled, with_unit
 
 _HUES = {"spin axis": "orange", "momentum axis": "violet", "core axis": "pink"}
+_BANDS = 400  # parts of a panel's width, each with the least and the largest value in it
 _LAST_TURNS = 10  # before a body is locked, in the phase plane
 
 Panel = Plot | Path | Callable[[Axes], None]
 Find = Callable[[xarray.Dataset], Panel | None]
 
 
-def draw(axes: Axes, dataset: xarray.Dataset, panel: Panel | None) -> None:
-    """Draw a panel of a dataset in memory, if there is one, with title, labels and units."""
+def draw(axes: Axes, dataset: xarray.Dataset, panel: Panel | None, *, dense: bool = False) -> None:
+    """Draw a panel of a dataset in memory, if there is one, with title, labels and units; a plot over time of
+    more swings than can be seen (`dense`) as bands between the extremes.
+    """
     if isinstance(panel, Plot):
-        _plot(axes, dataset, panel)
+        _plot(axes, dataset, panel, dense=dense)
     elif isinstance(panel, Path):
         _path(axes, panel)
     elif panel is not None:
         panel(axes)
 
 
-def _plot(axes: Axes, dataset: xarray.Dataset, plot: Plot) -> None:
+def _plot(axes: Axes, dataset: xarray.Dataset, plot: Plot, *, dense: bool) -> None:
     """Draw curves over time, with bands of their uncertainty or of what is expected of them."""
     time = clock(dataset)[0]
     for column, label, hue in zip(plot.values.T, plot.labels, cycle(plot.hues), strict=False):
         color = paper(hue)
         if plot.log:
             axes.plot(time, np.where(column > 0, column, np.nan), color=color, label=label, lw=0.9)
+        elif dense and len(time) >= 4 * _BANDS:
+            parts = np.arange(0, len(time), len(time) // _BANDS)
+            low, high = np.fmin.reduceat(column, parts), np.fmax.reduceat(column, parts)
+            at = np.append(time[parts[:-1]], time[-1])
+            axes.fill_between(at, low, high, color=color, alpha=0.35, lw=0.6)
+            axes.plot([], [], color=color, label=label)
         else:
             curve(axes, time, column, sparse=plot.sparse, color=color, label=label)
         if plot.error is not None:
@@ -85,7 +94,7 @@ def phases(dataset: xarray.Dataset) -> Panel | None:
         return None
     table, names = found[0], found[1]["labels"]
     rate = np.gradient(table, signals.seconds(dataset), axis=0)
-    (scale, unit), (speed, speed_unit) = angle_scale(table), si_scale(rate, "rad/s")
+    (scale, unit), (speed, speed_unit) = scaled(table, "rad"), scaled(rate, "rad/s")
 
     def drawn(axes: Axes) -> None:
         for x, y, name, hue in zip((table / scale).T, (rate / speed).T, names, style.PALETTE, strict=False):
@@ -104,7 +113,7 @@ def locking_phases(dataset: xarray.Dataset) -> Panel | None:
     rate = dataset["angular_velocity"].values @ scene_of(dataset).figure
     middle, rate = float(np.mean(longitude[found.last])), rate - np.mean(rate[found.last])
     rest = slice(int(np.argmax(np.abs(longitude - middle) < 2 * np.pi * _LAST_TURNS)), None)
-    speed, unit = si_scale(rate[rest], "rad/s")
+    speed, unit = scaled(rate[rest], "rad/s")
     # within half a turn of where it ends, that between -45 and 315 degrees
     centre = np.remainder(middle + np.pi / 4, 2 * np.pi) - np.pi / 4
     within = np.degrees(np.remainder(longitude[rest] - middle + np.pi, 2 * np.pi) - np.pi + centre)
@@ -123,7 +132,7 @@ def flight(dataset: xarray.Dataset) -> Panel | None:
     position, flat = signals.values(dataset, "position", 3), paths.flight(dataset)
     if flat is not None or position is None:
         return flat
-    scale, unit = si_scale(position - position[0], "m")
+    scale, unit = scaled(position - position[0], "m")
 
     def drawn(axes: Axes) -> None:
         view = surfaces.View.of(axes, np.array([0.74, -0.52, 0.43]))

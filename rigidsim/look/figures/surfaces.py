@@ -30,8 +30,7 @@ from rigidsim.look.paths import herpolhode_plane
 from rigidsim.look.record import scene_of
 from rigidsim.look.signals import joined
 from rigidsim.look.solids import Array, rotation_matrix
-from rigidsim.look.units import number
-from rigidsim.scene.readable import si_scale
+from rigidsim.scene.readable import scaled, typeset
 
 Mask = NDArray[np.bool_]
 Draw = Callable[[Axes], None]
@@ -168,7 +167,7 @@ class View:
         corner = low - 0.04 * reach
         for k, name in enumerate(names):
             stop = np.where(np.arange(3) == k, high + 0.12 * reach, corner)
-            self.spoke(corner, stop, f"{name}\n{number(low[k], 3)} … {number(high[k], 3)}", COLORS[k])
+            self.spoke(corner, stop, f"{name}\n{typeset(low[k], 3)} … {typeset(high[k], 3)}", COLORS[k])
         for k in floors:
             floor = np.where(np.arange(3) == k, corner, points)
             self.line(floor, color=PALE, lw=0.6, zorder=1)
@@ -216,7 +215,7 @@ def polhode(dataset: xarray.Dataset) -> Draw | None:
 
 def _polhode(axes: Axes, dataset: xarray.Dataset, rates: Array) -> None:
     found, moments = surfaces(dataset), scene_of(dataset).moments
-    scale, unit = si_scale(rates if found is None else np.concatenate(found), "rad/s")
+    scale, unit = scaled(rates if found is None else np.concatenate(found), "rad/s")
     names, points = [f"$ω_{name}$" for name in signals.axis_names(dataset)], rates / scale
     if found is None or moments is None:
         view = View.of(axes, _VIEWS[0])
@@ -237,7 +236,7 @@ def _polhode(axes: Axes, dataset: xarray.Dataset, rates: Array) -> None:
         view.ellipsoid(momentum, MOMENTUM_SURFACE, "L²", outside=energy, alpha=0.42)
         title = "Polhode: the surfaces of energy and momentum"
     view.run(points, energy, "ω")
-    labels = [f"{name}\n{number(size, 3)} {unit}" for name, size in zip(names, energy, strict=True)]
+    labels = [f"{name}\n{typeset(size, 3)} {unit}" for name, size in zip(names, energy, strict=True)]
     view.spokes(np.maximum(energy, momentum), labels)
     key(axes, title)
 
@@ -265,7 +264,7 @@ def poinsot(dataset: xarray.Dataset) -> Draw | None:
     first, second = signals.across(along)
     to_picture = np.stack([first, -second, -along])
     turn = to_picture @ rotation_matrix(quaternion[:1])[0] @ scene_of(dataset).axes.T
-    scale, _ = si_scale(found[0], "rad/s")
+    scale, _ = scaled(found[0], "rad/s")
     return partial(_poinsot, radii=found[0] / scale, traced=plane / scale, points=rates / scale, turn=turn)
 
 
@@ -322,7 +321,7 @@ def _sphere(axes: Axes, ways: Array, gyrostat: Gyrostat, title: str) -> None:
         shares = np.cumsum(weights[order]) / weights.sum()
         levels = np.interp((np.arange(_LEVELS) + 0.5) / _LEVELS, shares, both[order])
         axes.contour(right, up, sides[0], np.unique(levels), colors=_LEVEL, linewidths=0.6, zorder=2)
-    view.run(ways, _ONES, f"L = {number(gyrostat.size, 3)} kg m²/s")
+    view.run(ways, _ONES, f"L = {typeset(gyrostat.size, 3)} kg m²/s")
     saddles = np.array([one.direction for one in gyrostat.equilibria if one.unstable])
     if len(saddles):
         heights = np.unique(gyrostat.energy(saddles))

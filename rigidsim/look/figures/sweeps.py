@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from rigidsim.look.figures.style import GREY, INK, PALE, PALETTE, blank, key, styled, titled
 from rigidsim.look.record import read_config
 from rigidsim.look.solids import Array
-from rigidsim.look.units import pretty_unit, scaled, with_unit
+from rigidsim.scene.readable import pretty_unit, scaled, with_unit
 
 INDICATORS = ("megno", "fli", "lyapunov")
 _ALWAYS = (
@@ -310,10 +310,11 @@ def _points(dataset: xarray.Dataset, variable: xarray.DataArray, members: list[A
     dims = [axis.dim for axis in members]
     (occurrence,) = [dim for dim in variable.dims if str(dim).endswith(_SECTION)]
     rest = [dim for dim in variable.dims if dim not in (*dims, occurrence)]
-    stacked = variable.stack(member=dims, component=rest).transpose("member", occurrence, "component")
-    stride = max(1, -(-stacked[..., 0].size // _MOST_POINTS))
-    rows = np.asarray(stacked.values, dtype=np.float64).reshape(-1, stacked.shape[2])[::stride]
-    which = np.repeat(np.arange(len(stacked)), stacked.shape[1])[::stride]
+    whole = np.asarray(variable.transpose(*dims, occurrence, *rest).values, dtype=np.float64)
+    table = whole.reshape(-1, variable.sizes[occurrence], math.prod(variable.sizes[dim] for dim in rest))
+    stride = max(1, -(-table[..., 0].size // _MOST_POINTS))
+    rows = table.reshape(-1, table.shape[2])[::stride]
+    which = np.repeat(np.arange(len(table)), table.shape[1])[::stride]
     figure = blank(dataset, 8.4, 6.0)
     axes = figure.add_subplot()
     style: dict[str, Any] = {"s": 2.5, "lw": 0, "rasterized": True}
@@ -323,12 +324,12 @@ def _points(dataset: xarray.Dataset, variable: xarray.DataArray, members: list[A
         still = np.ptp(known, axis=0) <= _STILL * np.abs(known).max() if len(known) else [False]
         one, other = sorted(np.argsort(still, kind="stable")[:2].tolist()) if len(known) else (0, 1)
         axes.scatter(rows[:, one], rows[:, other], c=which, cmap="viridis", **style)
-        across, up = (" ".join(stacked["component"].values[k]) for k in (one, other))
-        axes.set(xlabel=f"{_named(variable)}, {across}", ylabel=f"{_named(variable)}, {up}")
+        names = [" ".join(parts) for parts in product(*(variable[dim].values for dim in rest))]
+        axes.set(xlabel=f"{_named(variable)}, {names[one]}", ylabel=f"{_named(variable)}, {names[other]}")
         titled(axes, f"{_title(variable)}; coloured by member")
         return figure
     alone = len(members) == 1
-    place = members[0].place if alone else np.arange(len(stacked))
+    place = members[0].place if alone else np.arange(len(table))
     axes.scatter(place[which], rows[:, 0], color=GREY, **style)
     axes.set(xlabel=members[0].label if alone else "member", ylabel=_named(variable))
     titled(axes, _title(variable))

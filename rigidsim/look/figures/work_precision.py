@@ -104,29 +104,24 @@ def _look(dataset: xarray.Dataset, n: int) -> tuple[str, str]:
 
 
 def _legend(axes: Axes, dataset: xarray.Dataset, short: bool) -> None:
-    def handle(label: str, **options: Any) -> Line2D:
-        return Line2D([], [], linestyle="none", label=label, markersize=7, **options)
-
-    shown = np.isfinite(dataset["cpu_ratio"].values)
-    precisions = set(dataset["precision"].values[shown])
-    kinds = set(dataset["formulation"].values[shown])
-    methods = [method_named(str(name)) for name in dict.fromkeys(dataset["method"].values[shown])]
-    handles = [handle(p, marker="o", color=c) for p, c in _COLORS.items() if p in precisions]
+    shown = dataset.isel(setting=np.isfinite(dataset["cpu_ratio"].values))
+    precisions, kinds = (set(shown[name].values) for name in ("precision", "formulation"))
+    methods = [method_named(str(name)) for name in dict.fromkeys(shown["method"].values)]
+    models, others = ("model" in dataset.sizes), ("other" in dataset.sizes)
     grey = {"color": "#444444", "markerfacecolor": "white", "markeredgewidth": 1.3}
-    handles += [handle(k.replace("_", " "), marker=m, **grey) for k, m in _MARKERS.items() if k in kinds]
-    handles += [handle(m.title, marker=_STEPLESS, color="#444444") for m in methods if not m.has_steps]
-    handles.append(handle("filled: invariants projected", marker="o", color="#444444"))
-    if "model" in dataset.sizes:
-        handles.append(handle("averaged model: axes, to the end", marker="P", color=_OTHER))
-    if "other" in dataset.sizes:
-        handles.append(handle("another tool's file", marker="X", color=_OTHERS))
-    if short:
-        handles.append(handle("pale: over less of the motion", marker="o", color="#444444", alpha=0.45))
+    entries: list[tuple[str, dict[str, Any]]] = [
+        *((p, {"marker": "o", "color": c}) for p, c in _COLORS.items() if p in precisions),
+        *((k.replace("_", " "), {"marker": m, **grey}) for k, m in _MARKERS.items() if k in kinds),
+        *((m.title, {"marker": _STEPLESS, "color": "#444444"}) for m in methods if not m.has_steps),
+        ("filled: invariants projected", {"marker": "o", "color": "#444444"}),
+        *[("averaged model: axes, to the end", {"marker": "P", "color": _OTHER})] * models,
+        *[("another tool's file", {"marker": "X", "color": _OTHERS})] * others,
+        *[("pale: over less of the motion", {"marker": "o", "color": "#444444", "alpha": 0.45})] * short,
+    ]
+    handles = [Line2D([], [], linestyle="none", label=text, markersize=7, **look) for text, look in entries]
     handles.append(Line2D([], [], color=_FRONT, linewidth=1.1, label="best of all (numbered)"))
-    # models are cheap, and not exact
-    place: Any = "lower left" if "model" in dataset.sizes else "upper right"
-    if "other" in dataset.sizes:  # which may be anywhere
-        place = "best"
+    # models are cheap, and not exact; another tool's file may be anywhere
+    place = "best" if others else "lower left" if models else "upper right"
     axes.legend(handles=handles, loc=place, ncols=2, fontsize=8, frameon=True, framealpha=0.9)
 
 
