@@ -27,7 +27,7 @@ from rigidsim.scene.earth_axes import earth_axes, rotation_rate
 from rigidsim.scene.expressions.names import PLACES, NameProvider, Readable, provides
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
-from rigidsim.scene.tracing import plain
+from rigidsim.scene.swept import plain
 
 NRLMSISE = "nrlmsise00"
 AIR_DENSITY = "air_density"

@@ -43,7 +43,7 @@ from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, PointMasses, clo
 from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.space_axes import ECLIPTIC
-from rigidsim.scene.tracing import plain
+from rigidsim.scene.swept import plain
 
 _CENTURY = 36525 * 86400
 _ARCSEC = ExactNumber(Fraction(1, 3600 * 180), pi_power=1)

@@ -36,7 +36,7 @@ from rigidsim.scene.arithmetic import (
 )
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.tracing import Traced, plain
+from rigidsim.scene.swept import Swept, plain
 
 _STATES = 3
 _SWEPT = "swept"  # numbers of a sweep's member that the probes have read
@@ -71,9 +71,9 @@ class Probe(Mechanics):
             return -size if x < 0 else size
 
         def number(x: Any) -> Any:
-            if isinstance(x, Traced):  # zero in all members of a sweep or in none
+            if isinstance(x, Swept):  # zero in all members of a sweep or in none
                 m.made.setdefault(_SWEPT, []).append(x)
-                x = context.zero if x == 0 else x.value
+                x = context.zero if x == 0 else x.first
             return real(x)
 
         def drawn(count: int) -> Vector:

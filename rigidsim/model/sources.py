@@ -50,7 +50,7 @@ from rigidsim.scene.expressions.tree import names_used
 from rigidsim.scene.registry import LoadFields
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
-from rigidsim.scene.tracing import plain
+from rigidsim.scene.swept import plain
 
 RELATIVE_NAMES = ("vrx", "vry", "vrz")
 _FLIGHT = frozenset({"flight", PLACES})

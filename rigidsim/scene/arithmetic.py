@@ -12,7 +12,7 @@ from typing import Any
 
 import mpmath
 
-from rigidsim.scene.tracing import called
+from rigidsim.scene.swept import called
 
 WORKING_BITS = {"single": 24, "double": 53, "extended": 64, "quadruple": 113}
 # Enough that cancellation in a derived constant (a difference of moments of 1e-15) still leaves every bit.

@@ -31,10 +31,10 @@ def _within(context: Any) -> Rotations:
 
 def _without_rounding(value: Any, terms: Sequence[Any]) -> Any:
     """The value, or zero if it is the rounding of its terms; floats and arrays, without guard bits, stay."""
-    context = getattr(getattr(value, "graph", value), "context", None)  # a traced number's is its graph's
+    context = getattr(value, "context", None)
     if context is None or context.prec < GUARD_BITS:
         return value
-    size = rotations.from_left([abs(term) for term in terms])  # no comparison of terms: a guard of a batch
+    size = rotations.from_left([abs(term) for term in terms])  # not compared: members of a sweep may differ
     return value * 0 if abs(value) < negligible(context) * size else value
 
 

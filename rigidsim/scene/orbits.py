@@ -18,8 +18,8 @@ from rigidsim.scene.kepler import Ellipse, combined, plane_vectors
 from rigidsim.scene.orbit_tables.elements import read_table
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.registry import LoadFields, Setting
+from rigidsim.scene.swept import Swept, SweptExact, Untraceable
 from rigidsim.scene.text_tables import TableError
-from rigidsim.scene.tracing import Traced, TracedExact, Untraceable
 from rigidsim.scene.validation_messages import nearest
 
 MEAN_MOTION_KEYS = ("period", "sidereal_period", "longitude_rate")
@@ -282,7 +282,7 @@ def resolve_tabulated_orbit(fields: Elements, strength: Any | None, around: Sett
     """Work out a table's orbit; ``strength`` is the gravitational parameter of Kepler's law, if known."""
     name, texts, context = str(fields.table), around.config.texts, around.context
     given = [(key, getattr(fields, key)) for key in sorted(fields.model_fields_set - {"table"})]
-    if isinstance(strength, Traced) or any(isinstance(value, TracedExact) for _, value in given):
+    if isinstance(strength, Swept) or any(isinstance(value, SweptExact) for _, value in given):
         raise Untraceable("an orbit by a table depends on it")
     place = f"{fields.key}.table"
     what = f'given "{name}", but this config was given as text, without files next to it; put the CSV into '

@@ -20,7 +20,7 @@ from rigidsim.scene.fields import (
     Rate,
     VariableName,
 )
-from rigidsim.scene.tracing import plain
+from rigidsim.scene.swept import plain
 
 _ROUNDING_OF_INPUT = 1e-14  # relative, of moments that a double-precision program printed
 

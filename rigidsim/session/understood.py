@@ -26,7 +26,7 @@ from rigidsim.scene.suspicions import (
     suspicious_expressions,
     unreachable_events,
 )
-from rigidsim.scene.tracing import plain
+from rigidsim.scene.swept import plain
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.store.summary import Span, Start, Three, UnderstoodBody
 

@@ -88,7 +88,7 @@ def limit_disk_cache() -> None:
         warnings.warn(f"compiled code isn't kept for the next process: {error}", RuntimeWarning, stacklevel=3)
 
 
-FUNCTIONS: Kept[CompiledFunction] = Kept(32)
+FUNCTIONS: Kept[CompiledFunction] = Kept(64)
 ENGINES: Kept[TaylorEngine] = Kept(8)
 """Those compiled so far."""
 

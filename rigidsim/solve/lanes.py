@@ -6,6 +6,7 @@ recorded. If a state is no longer finite, heyoka stops all lanes at once: each i
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import heyoka as hy
@@ -18,8 +19,6 @@ from rigidsim.solve.stepper import bound_of_sparse_series, longest_step
 _GRID = 1 << 16
 """Samples at once; the step before the last of them is shortened, always at the same places."""
 _ARRIVED, _LOST = hy.taylor_outcome.time_limit, hy.taylor_outcome.err_nf_state
-
-_engines: Kept[Any] = Kept(16)
 
 _Motions = tuple[np.ndarray, ...]
 """Of motions to be integrated: initial and parameters (.., n), start (n,), times (samples, n), and bounds of
@@ -35,6 +34,9 @@ class Found:
     lane: int
     time: float
     state: np.ndarray
+
+
+_engines: Kept[tuple[Any, list[Found]]] = Kept(64)
 
 
 @dataclass
@@ -85,32 +87,36 @@ class BatchEngine:
         # recorded quantities may read more parameters than equations and events
         read = [right for _, right in equations] + [expression for expression, _ in events]
         self._used = max((int(str(p).removeprefix("p")) + 1 for p in hy.get_params(read)), default=0)
-        self._log: list[Found] = []
+        key = list(equations), list(events), width, compact, tolerance
+        self._integrator, self._log = _engines.get(key, lambda: self._made(*key))
+        self._longest = longest_step(self._integrator.order, np.float64)
+
+    def _made(
+        self,
+        equations: list[tuple[Any, Any]],
+        events: list[tuple[Any, int]],
+        width: int,
+        compact: bool,
+        tolerance: float | None,
+    ) -> tuple[Any, list[Found]]:
+        """An integrator, and the crossings of its events since the list was cleared."""
+        log: list[Found] = []
         options: dict[str, Any] = {"compact_mode": compact}
         if tolerance is not None:
             options["tol"] = tolerance
         if self._used:
             options["pars"] = np.zeros((self._used, width))
-        states = np.zeros((len(equations), width))
-        if events:  # whose callbacks belong to this object
+
+        def noting(event: int, integrator: Any, time: float, _: int, lane: int) -> None:
+            state = integrator.update_d_output(np.full(width, time))[:, lane]
+            log.append(Found(event, lane, float(time), np.array(state)))
+
+        if events:
             options["nt_events"] = [
-                hy.nt_event_batch(expression, self._noting(n), direction=DIRECTIONS[direction])
+                hy.nt_event_batch(expression, partial(noting, n), direction=DIRECTIONS[direction])
                 for n, (expression, direction) in enumerate(events)
             ]
-            self._integrator = hy.taylor_adaptive_batch(list(equations), states, **options)
-        else:
-            key = list(equations), width, compact, tolerance
-            self._integrator = _engines.get(
-                key, lambda: hy.taylor_adaptive_batch(list(equations), states, **options)
-            )
-        self._longest = longest_step(self._integrator.order, np.float64)
-
-    def _noting(self, event: int) -> Any:
-        def called(integrator: Any, time: float, _: int, lane: int) -> None:
-            state = integrator.update_d_output(np.full(self.width, time))[:, lane]
-            self._log.append(Found(event, lane, float(time), np.array(state)))
-
-        return called
+        return hy.taylor_adaptive_batch(equations, np.zeros((len(equations), width)), **options), log
 
     def run(
         self,

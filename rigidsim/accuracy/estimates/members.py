@@ -24,7 +24,7 @@ from rigidsim.accuracy.estimates.estimate import (
     UNCERTAIN,
     plain_perturbations,
 )
-from rigidsim.solve.batch.family import Family, Numbers
+from rigidsim.solve.batch.family import Family
 from rigidsim.solve.batch.run import BatchBlock
 from rigidsim.solve.error_tangents import (
     SHORTEST,
@@ -70,20 +70,20 @@ class MemberErrors:
 
 
 class MemberEstimates:
-    """Estimates for a family's members, with what they need compiled once."""
+    """Estimates for a family's members."""
 
     def __init__(self, family: Family, width: int) -> None:
-        self._traced, self._width = family.traced, width
-        self._system, self._prepared = family.traced.system, family.traced.prepared
+        self._family, self._width = family, width
+        self._system, self._prepared = family.system, family.prepared
         self._epsilon = float(self._prepared.precision.epsilon)
-        self._measures = Measures(self._system, self._traced.moving, self._traced.parameters.variables)
+        self._measures = Measures(self._system, family.moving, family.variables)
 
     def _engine(self, tolerance: float) -> BatchEngine:
         """Integrator of the motion alone, with an error of the time after its parameters."""
-        traced = self._traced
-        rights = traced.as_parameters([right for _, right in traced.system.equations[: traced.moving]])
-        equations = zip(traced.system.variables, timed(rights, len(traced.in_equations)), strict=False)
-        width, wide = max(self._width, _LANES), traced.system.wide
+        family = self._family
+        rights = family.as_parameters([right for _, right in family.system.equations[: family.moving]])
+        equations = zip(family.system.variables, timed(rights, len(family.in_equations)), strict=False)
+        width, wide = max(self._width, _LANES), family.system.wide
         return BatchEngine(list(equations), width, tolerance=tolerance, compact=wide)
 
     @cached_property
@@ -98,13 +98,13 @@ class MemberEstimates:
         """Compile beforehand what most members need."""
         _ = self._lanes if self._by_chance else self._better
 
-    def of(self, numbers: Numbers, block: BatchBlock) -> MemberErrors:
+    def of(self, block: BatchBlock) -> MemberErrors:
         """Errors of a block's members."""
         ran = np.array([status is not None for status in block.status]) & (block.reached > 0)
         some = np.flatnonzero(ran)
         found = np.full((4, len(ran)), np.nan)
         if len(some):
-            found[:, some] = self._errors(numbers, block, some)
+            found[:, some] = self._errors(block, some)
         attitude, rates, position, velocity = found
         flies = "x" in self._system.states
         carried = self._measures.carried
@@ -112,29 +112,30 @@ class MemberEstimates:
             attitude if carried else None, rates, position if flies else None, velocity if flies else None
         )
 
-    def _errors(self, numbers: Numbers, block: BatchBlock, some: np.ndarray) -> np.ndarray:
-        places, scaling, system = block.places[some], self._system.scaling, self._system
-        units = numbers.whole_numbers(scaling.time)[places]
+    def _errors(self, block: BatchBlock, some: np.ndarray) -> np.ndarray:
+        family, system = self._family, self._system
+        places, scaling = block.places[some], system.scaling
+        units = family.whole_numbers(scaling.time)[places]
         seconds = block.times[block.reached[some] - 1]
         begin_seconds = float(self._prepared.scene.start)
         way = self._prepared.scene.samples.direction
         begin, duration = way * np.ldexp(begin_seconds, -units), way * (seconds - begin_seconds)
         exponents = [
-            numbers.whole_numbers(system.state_exponents[place])[places]
+            family.whole_numbers(system.state_exponents[place])[places]
             for place in self._measures.places["rates"]
         ]
         starts = Starts(
-            numbers.initial[: self._traced.moving, places],
+            family.initial[: family.moving, places],
             begin,
             begin + np.ldexp(duration, -units),
             block.steps[some],
             np.ldexp(1.0, np.array(exponents, dtype=np.int64).reshape(-1, len(places))),
-            numbers.parameters[:, places],
+            family.parameters[:, places],
         )
         by_chance = self._by_chance
         spread = self._followed(block, some, starts) if by_chance else self._compared(block, some, starts)
         label = LABEL * self._epsilon * np.maximum(abs(begin_seconds), np.abs(seconds))
-        pace = numbers.doubles(system.rate_bound)[places]
+        pace = family.doubles(system.rate_bound)[places]
         level = SAFETY * self._epsilon if by_chance else COMPARED
         last, path = LAST_BITS * self._epsilon, PATH if by_chance else 1.0
         with np.errstate(over="ignore"):
@@ -150,7 +151,7 @@ class MemberEstimates:
             moved = last * extent + np.ldexp(label, -units) * fastest
             position = path * at_end("position", moved, AS_LARGE * extent)
             velocity = path * at_end("velocity", last * fastest, AS_LARGE * fastest)
-        length, speed = (numbers.whole_numbers(e)[places] for e in (scaling.length, scaling.speed))
+        length, speed = (family.whole_numbers(e)[places] for e in (scaling.length, scaling.speed))
         return np.array([attitude, rates, np.ldexp(position, length), np.ldexp(velocity, speed)])
 
     @property
@@ -160,7 +161,7 @@ class MemberEstimates:
 
     def _compared(self, block: BatchBlock, some: np.ndarray, starts: Starts) -> Spread:
         """Distance of members from runs at a tighter tolerance."""
-        read = starts.parameters[self._traced.in_equations]
+        read = starts.parameters[self._family.in_equations]
         most = _MORE_STEPS * int(starts.steps.max()) + 1000
         moments = block.moments[:, some]
         read = np.concatenate([read, np.zeros((1, len(some)))])
@@ -173,14 +174,14 @@ class MemberEstimates:
         return spread
 
     def _followed(self, block: BatchBlock, some: np.ndarray, starts: Starts) -> Spread:
-        epsilon, read = self._epsilon, starts.parameters[self._traced.in_equations]
+        epsilon, read = self._epsilon, starts.parameters[self._family.in_equations]
         carrier = MemberCarrier(self._lanes, read, starts)
         loose = max(self._prepared.effective_tolerance / epsilon, 1.0)
         errors = plain_perturbations(self._prepared.system, loose)
         rows = np.unique(np.linspace(0, len(block.moments) - 1, _BEGUN_ANEW + 2).astype(int)[1:-1])
         times, states = (
             block.moments[np.ix_(rows, some)],
-            block.states[:, : self._traced.moving][rows][:, :, some],
+            block.states[:, : self._family.moving][rows][:, :, some],
         )
         unknown = ~np.isfinite(states).all(axis=1) | (rows[:, None] >= block.reached[some])
         known = Known(np.where(unknown, np.nan, times), states)

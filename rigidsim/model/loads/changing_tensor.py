@@ -80,7 +80,7 @@ from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.registry import Setting, names_of, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
-from rigidsim.scene.tracing import plain
+from rigidsim.scene.swept import plain
 from rigidsim.scene.validation_messages import nearest
 
 _CLOCK = "t_of_moments"

@@ -109,7 +109,7 @@ from rigidsim.scene.point_masses import PointMasses
 from rigidsim.scene.registry import LoadFields, SceneLoad, Setting, SourceFields, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.space_axes import ECLIPTIC
-from rigidsim.scene.tracing import plain
+from rigidsim.scene.swept import plain
 
 
 def _of_placement(name: str) -> Any:

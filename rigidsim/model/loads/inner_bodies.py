@@ -59,7 +59,7 @@ from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.rotors import Bearing, RotorTable
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
-from rigidsim.scene.tracing import plain
+from rigidsim.scene.swept import plain
 
 
 @register_load(table="rotors")

@@ -52,7 +52,7 @@ from rigidsim.scene.orbits import OrbitFields, resolve_orbit
 from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
-from rigidsim.scene.tracing import plain
+from rigidsim.scene.swept import plain
 
 FIELD_NAMES = ("bx", "by", "bz")
 IGRF = "igrf"

@@ -23,7 +23,7 @@ from rigidsim.scene.bodies.presets import PRESETS, Preset
 from rigidsim.scene.bodies.shapes import DIMENSIONS, SHAPES
 from rigidsim.scene.exact import ExactNumber, exact_decimal, parse_number
 from rigidsim.scene.paths import numbers
-from rigidsim.scene.tracing import plain
+from rigidsim.scene.swept import plain
 from rigidsim.scene.validation_messages import shown
 
 SOURCES = ("principal_moments", "inertia_tensor", "points", "shape", "parts", "preset")

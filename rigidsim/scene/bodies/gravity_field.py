@@ -30,7 +30,7 @@ from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.scene.exact import parse_number, rounded
 from rigidsim.scene.fields import ConfigTable, Dimensionless, Metre, Positive, excludes, one_of, refuse
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
-from rigidsim.scene.tracing import plain
+from rigidsim.scene.swept import plain
 from rigidsim.scene.validation_messages import shown
 
 WHERE = "[body] gravity_field"

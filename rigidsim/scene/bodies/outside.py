@@ -28,7 +28,7 @@ from rigidsim.scene.fields import (
     Triple,
 )
 from rigidsim.scene.rotations import quaternion_of
-from rigidsim.scene.tracing import plain
+from rigidsim.scene.swept import plain
 
 Area = Annotated[ExactNumber, InUnit("m^2")]
 _DRAG = ExactNumber(Fraction(11, 5))

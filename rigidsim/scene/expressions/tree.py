@@ -164,7 +164,7 @@ def placed(expression: Expression, place: Place | None, *, anew: bool = False) -
 def _exact(operator: str, numbers: Sequence[ExactNumber]) -> ExactNumber | None:
     """The exact result; None if it isn't a rational times a power of pi, or is too long."""
     if any(number.swept for number in numbers):
-        from rigidsim.scene.tracing import exactly
+        from rigidsim.scene.swept import exactly
 
         return exactly(operator, numbers)
     a, b = numbers[0], numbers[-1]

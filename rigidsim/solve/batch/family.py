@@ -1,31 +1,44 @@
-"""Members of a sweep as the batch engine sees them, and families of those that share their equations."""
+"""Members of a sweep as the batch engine sees them, and families of those that share their equations.
+
+A family's system is built once with the numbers of all its members (``rigidsim.scene.swept``), for whom a
+coefficient that depends on what is swept is a parameter.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import heyoka as hy
 import numpy as np
 
 from rigidsim.errors import ConfigError
+from rigidsim.model.formulations.formulation import ModelPlan
+from rigidsim.model.model_plan import plan_model
+from rigidsim.model.names import TANGENT
 from rigidsim.model.scaling import EstimatedEffect
+from rigidsim.model.system import System
+from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.choices import DEFAULT_METHOD, FULL, variables_named
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.paths import Path
+from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.scene.sweep import Sweep
-from rigidsim.scene.tracing import Traced, Untraceable
-from rigidsim.solve.batch.tracing import TRACED_TABLES, Reals, Replay, TracedSystem, real_of, trace
+from rigidsim.scene.swept import Swept, SweptContext, SweptExact, Untraceable
 from rigidsim.solve.effects.effect import registered_effects
 from rigidsim.solve.precision import precision_of
-from rigidsim.solve.problem import prepare
+from rigidsim.solve.problem import InitialValueProblem, prepare
 
 _HELD = 1 << 16  # values of axes that are held, each worked out once for all members that share it
-_AT_ONCE = 2048  # members whose numbers are worked out together
+_AT_ONCE = 4096  # members whose numbers are worked out together
+_SWEPT_TABLES = ("body", "initial", "loads", "rotors", "parameters")
+"""Config tables whose numbers may become parameters."""
+_DOUBLE = precision_of("double")
 
 
 class NotBatchable(Enum):
@@ -71,23 +84,22 @@ def batchable(experiment: Experiment, keys: Sequence[str]) -> NotBatchable | Non
         NotBatchable.AVERAGED: config.model.level != FULL,
         NotBatchable.ORIENTATION: config.output.orientation is not None,
         NotBatchable.LYAPUNOV: config.output.lyapunov,
-        NotBatchable.KEY: any(Path.of(key).steps[0] not in TRACED_TABLES for key in keys),
+        NotBatchable.KEY: any(Path.of(key).steps[0] not in _SWEPT_TABLES for key in keys),
     }
     return next((reason for reason, holds in reasons.items() if holds), None)
 
 
-def _reason_of_system(traced: TracedSystem) -> NotBatchable | None:
-    system = traced.system
+def _reason_of_system(prepared: InitialValueProblem, system: System) -> NotBatchable | None:
     # angles in so large a unit are never wrapped here: what follows from them is joined
     unwrapped = bool(system.angle_states and system.angle_unit)
     known = {"", "wrapped", "parity"} if unwrapped else {"", "nearest"}
     reasons = {
-        NotBatchable.EFFECT: bool(registered_effects(system, precision_of("double"))),
+        NotBatchable.EFFECT: bool(registered_effects(system, _DOUBLE)),
         NotBatchable.SWITCHING: system.switches,
         NotBatchable.MOVED_MASS: len(system.crossings) > len(system.events),
         NotBatchable.TABLE: system.pieces is not None,
         NotBatchable.MOMENT: system.clocked,
-        NotBatchable.NUTATION: traced.prepared.system.in_two_parts,
+        NotBatchable.NUTATION: prepared.system.in_two_parts,
         NotBatchable.BODIES: system.scene.bodies is not None,
         NotBatchable.CHART: system.partner is not None or (system.angle_states and not unwrapped),
         NotBatchable.ANGLES: not {r.continuity for r in system.recorded} <= known,
@@ -102,16 +114,33 @@ class AxisNumbers:
         self.sweep = sweep
         self._words: dict[int, dict[str, int]] = {}
         self._reals = lru_cache(_HELD)(self._reals_of)
+        self._context = SweptContext(context_for("double"), 0)
 
-    def traced(self, place: int) -> bool:
+    @cached_property
+    def drive(self) -> EstimatedEffect | None:
+        """The estimated effect of loads of unknown size, as the base experiment's build makes it: a power of
+        two in the units, which has to be the same whoever is a family's first member.
+        """
+        try:
+            return prepare(self.sweep.base).system.scaling.drive
+        except ConfigError as error:
+            raise Untraceable(str(error)) from error
+
+    def swept(self, place: int) -> bool:
         """Whether an axis has numbers that can become parameters."""
         axis = self.sweep.axes[place]
-        return axis.numeric and Path.of(axis.key).steps[0] in TRACED_TABLES
+        return axis.numeric and Path.of(axis.key).steps[0] in _SWEPT_TABLES
 
     def _reals_of(self, place: int, index: int) -> list[hy.real]:
-        return [real_of(number) for number in self.sweep.axes[place].exact(index)]
+        numbers, bits = self.sweep.axes[place].exact(index), self._context.prec
+        return [
+            self._context.real_of(x.at(self._context.plain))
+            if x.pi_power
+            else hy.real(x.rational.numerator, bits) / hy.real(x.rational.denominator, bits)
+            for x in numbers
+        ]
 
-    def columns(self, place: int, which: np.ndarray) -> list[Reals]:
+    def columns(self, place: int, which: np.ndarray) -> list[np.ndarray]:
         """The numbers that members have, a column for each key, from the index of each one's value."""
         needed, index = np.unique(which, return_inverse=True)
         columns = zip(*(self._reals(place, i) for i in needed.tolist()), strict=True)
@@ -136,157 +165,173 @@ class Members:
         self, sweep: Sweep, members: Sequence[int] | None = None, axes: AxisNumbers | None = None
     ) -> None:
         self._chosen = np.arange(sweep.count) if members is None else np.asarray(members, dtype=np.int64)
-        self._axes = AxisNumbers(sweep) if axes is None else axes
+        self.axes = AxisNumbers(sweep) if axes is None else axes
         self.sweep, self.count = sweep, len(self._chosen)
         self.keys: list[str] = []
         self.kinds = np.zeros(self.count, dtype=np.int64)
-        self._traced: list[tuple[int, np.ndarray]] = []
+        self._swept: list[tuple[int, np.ndarray]] = []
         rows = np.unravel_index(self._chosen, sweep.shape) if sweep.product else None
         for place, axis in enumerate(sweep.axes):
             which = self._chosen if rows is None else rows[place]
-            if self._axes.traced(place):
+            if self.axes.swept(place):
                 self.keys += axis.columns
-                self._traced.append((place, which))
+                self._swept.append((place, which))
             else:
-                self.kinds = self.kinds * axis.count + self._axes.codes(place, which)
+                self.kinds = self.kinds * axis.count + self.axes.codes(place, which)
 
     def experiment(self, member: int) -> Experiment:
         """A member's own experiment."""
-        return self.sweep.experiment_of(int(self._chosen[member]))
+        return self.sweep.worked_out(int(self._chosen[member]))
 
     def exact(self, member: int) -> list[ExactNumber]:
         """A member's exact numbers for ``keys``, SI."""
-        return [x for place, which in self._traced for x in self.sweep.axes[place].exact(int(which[member]))]
+        return [x for place, which in self._swept for x in self.sweep.axes[place].exact(int(which[member]))]
 
-    def columns(self, members: np.ndarray) -> list[Reals]:
+    def columns(self, members: np.ndarray) -> list[np.ndarray]:
         """The numbers of some members for each key (see ``AxisNumbers``)."""
-        return [x for place, which in self._traced for x in self._axes.columns(place, which[members])]
+        return [x for place, which in self._swept for x in self.axes.columns(place, which[members])]
 
 
-@dataclass
 class Family:
-    """Members that share the equations of a traced system, and their kind (see ``Members``)."""
-
-    traced: TracedSystem
-    kind: int
-
-
-class Numbers:
-    """Numbers of a family's members (indices), float64.
+    """Members that share a system of equations, and their numbers.
 
     Attributes:
+        prepared: the first member's own problem, in plain numbers.
+        system: the same system for all, whose coefficients are expressions of ``variables``.
+        members: places in ``Members``, (members,).
         initial: (states, members), internal units.
-        parameters: of the traced system, (parameters, members).
+        parameters: values of ``variables``, (parameters, members).
     """
 
-    def __init__(self, traced: TracedSystem, members: np.ndarray, replay: Replay, places: np.ndarray) -> None:
-        # places among the numbers of ``replay``
-        self.members, self._replay, self._places = members, replay, places
-        self.initial = np.array([self.doubles(value) for value in traced.system.initial])
-        found = [replay.doubles(node)[places] for node in traced.parameters.nodes]
-        self.parameters = np.array(found).reshape(len(found), len(members))
+    def __init__(
+        self, prepared: InitialValueProblem, scene: Scene, like: ModelPlan, candidates: np.ndarray
+    ) -> None:
+        self.prepared, self._context = prepared, scene.context
+        self._swept: dict[int, tuple[Swept, Any]] = {}
+        self.system = System(plan_model(scene, like=like), self._number)
+        for part in ("equations", "outputs", "invariants", "crossings", "rate_bound"):
+            getattr(self.system, part)
+        self._chosen = np.flatnonzero(self._context.agreed())
+        numbers = [*self.system.initial, *(value for value, _ in self._swept.values())]
+        found = np.array([self.doubles(value) for value in numbers])
+        within = np.isfinite(found).all(axis=0)
+        self._chosen, found = self._chosen[within], found[:, within]
+        self.members = candidates[self._chosen]
+        self.initial, self.parameters = np.split(found, [len(self.system.initial)])
+
+    def _number(self, value: Any) -> Any:
+        """A coefficient as a double, rounded once, or as a parameter."""
+        if not isinstance(value, Swept):
+            return _DOUBLE.number(value)
+        name = f"swept_{len(self._swept)}"
+        return self._swept.setdefault(id(value), (value, hy.make_vars(name)))[1]
+
+    @property
+    def variables(self) -> list[Any]:
+        """One variable for each coefficient that depends on what is swept."""
+        return [variable for _, variable in self._swept.values()]
 
     def doubles(self, value: Any) -> np.ndarray:
         """A number of the scene for each member, rounded once, (members,)."""
-        if isinstance(value, Traced):
-            return self._replay.doubles(value.node)[self._places]
-        return np.full(len(self.members), float(value))
+        return self._context.doubles(value)[self._chosen]
 
     def whole_numbers(self, value: Any) -> np.ndarray:
         """A whole number of the model for each member, (members,)."""
         return self.doubles(value).astype(np.int64)
+
+    @cached_property
+    def moving(self) -> int:
+        """Number of states of the motion; a tangent vector's states follow."""
+        return sum(not name.startswith(TANGENT) for name in self.system.states)
+
+    @cached_property
+    def in_equations(self) -> list[int]:
+        """Indices of the parameters that the motion's equations and events read."""
+        expressions = [right for _, right in self.system.equations[: self.moving]]
+        expressions += [crossing.expression for crossing in self.system.crossings]
+        read = {name for x in expressions for name in hy.get_variables(hy.expression(x))}
+        return [k for k, v in enumerate(self.variables) if str(v) in read]
+
+    def as_parameters(self, expressions: Sequence[Any]) -> list[Any]:
+        """Expressions with the parameters as ``hy.par``, numbered as in ``in_equations``."""
+        variables = self.variables
+        table = {variables[k]: hy.par[n] for n, k in enumerate(self.in_equations)}
+        found = [hy.expression(x) for x in expressions]
+        return hy.subs(found, table) if table else found
 
 
 @dataclass
 class Sorted:
     """Members sorted into families."""
 
-    groups: list[tuple[Family, Numbers]] = field(default_factory=list)
+    groups: list[Family] = field(default_factory=list)
     alone: dict[int, NotBatchable] = field(default_factory=dict)  # those that run by themselves
     refused: dict[int, ConfigError] = field(default_factory=dict)  # those that no run accepts
 
 
 class Families:
-    """Sorts members into families, each traced when its first member is met.
+    """Sorts members into families, each worked out with its first member's decisions.
 
     Args:
         most_refused: number of refused members after which the rest stays unsorted.
-        most_untraced: number of members that can't be traced after which no other is tried; no limit by
-            default, since a process would run others one by one than one that begins elsewhere.
     """
 
-    def __init__(
-        self, members: Members, most_refused: int | None = None, most_untraced: int | None = None
-    ) -> None:
-        self._members = members
-        self._most_refused, self._most_untraced = most_refused, most_untraced
-        self.known: list[Family] = []
+    def __init__(self, members: Members, most_refused: int | None = None) -> None:
+        self._members, self._most_refused = members, most_refused
+        self._sorted = Sorted()
 
     def sort(self) -> Sorted:
         """Sort all members."""
-        result = Sorted()
         for first in range(0, self._members.count, _AT_ONCE):
-            self._sort_some(np.arange(first, min(first + _AT_ONCE, self._members.count)), result)
-        return result
+            waiting = np.arange(first, min(first + _AT_ONCE, self._members.count))
+            while len(waiting) and len(self._sorted.refused) != self._most_refused:
+                kinds = self._members.kinds[waiting]
+                waiting = np.setdiff1d(waiting, self._take(waiting[kinds == kinds[0]]), assume_unique=True)
+        return self._sorted
 
-    def _sort_some(self, waiting: np.ndarray, result: Sorted) -> None:
-        for family in list(self.known):
-            waiting = self._taken(family, waiting, result)
-        while len(waiting):
-            first = int(waiting[0])
-            made = self._traced(first)
-            if isinstance(made, ConfigError):
-                result.refused[first] = made
-                if self._most_refused is not None and len(result.refused) >= self._most_refused:
-                    return
-                waiting = waiting[1:]
-            elif isinstance(made, NotBatchable):
-                result.alone[first] = made
-                waiting = waiting[1:]
-                if self._most_untraced is not None and len(result.alone) >= self._most_untraced:
-                    result.alone |= dict.fromkeys(waiting.tolist(), made)
-                    return
-            else:
-                self.known.append(made)
-                waiting = self._taken(made, waiting, result)
-
-    @cached_property
-    def _drive(self) -> EstimatedEffect | None:
-        """The load estimate as the base experiment's build makes it."""
+    def _take(self, candidates: np.ndarray) -> np.ndarray:
+        """Sort the first of some members of a kind, with all that share its equations; returns these."""
+        found, first = self._sorted, int(candidates[0])
+        context = SweptContext(context_for("double"), len(candidates))
         try:
-            return prepare(self._members.sweep.base).system.scaling.drive
-        except ConfigError as error:
-            raise Untraceable(str(error)) from error
-
-    def _traced(self, member: int) -> Family | ConfigError | NotBatchable:
-        try:
-            experiment = self._members.experiment(member)
+            experiment = self._members.experiment(first)
             reason = batchable(experiment, self._members.keys)
-            if reason is not None:
-                return reason
-            traced = trace(experiment, self._members.keys, self._members.exact(member), lambda: self._drive)
+            if reason is None:
+                family = self._worked_out(experiment, candidates, context)
+                reason = _reason_of_system(family.prepared, family.system)
         except ConfigError as error:
-            return error
+            found.refused[first] = error
+            return candidates[:1]
         except Untraceable:
-            return NotBatchable.UNTRACEABLE
-        return _reason_of_system(traced) or Family(traced, int(self._members.kinds[member]))
+            reason = NotBatchable.UNTRACEABLE
+        taken = candidates[context.agree]
+        alone = taken
+        if reason is None:
+            alone, reason = np.setdiff1d(taken, family.members), NotBatchable.RANGE
+            if len(family.members):
+                found.groups.append(family)
+        found.alone |= dict.fromkeys(alone.tolist(), reason)
+        return taken
 
-    def _taken(self, family: Family, waiting: np.ndarray, result: Sorted) -> np.ndarray:
-        """Put the waiting members of a family into the result; returns those that are left."""
-        candidates = waiting[self._members.kinds[waiting] == family.kind]
-        if not len(candidates):
-            return waiting
-        graph = family.traced.graph
-        replay = Replay(graph, self._members.columns(candidates), len(candidates))
-        agree = np.flatnonzero(replay.agreeing())
-        taken = candidates[agree]
-        if not len(taken):
-            return waiting
-        numbers = Numbers(family.traced, taken, replay, agree)
-        within = np.isfinite(numbers.initial).all(axis=0) & np.isfinite(numbers.parameters).all(axis=0)
-        if not within.all():
-            result.alone |= dict.fromkeys(taken[~within].tolist(), NotBatchable.RANGE)
-            numbers = Numbers(family.traced, taken[within], replay, agree[within])
-        if len(numbers.members):
-            result.groups.append((family, numbers))
-        return waiting[~np.isin(waiting, taken)]
+    def _worked_out(self, experiment: Experiment, candidates: np.ndarray, context: SweptContext) -> Family:
+        """The family of the first of some members.
+
+        Raises:
+            ConfigError: the member is refused, as a single run of it would be.
+            Untraceable: something can't be worked out for many members at once.
+        """
+        prepared, config = prepare(experiment), experiment.config
+        plan, members = prepared.system.plan, self._members
+        if plan.scaling.drive is not None:
+            plan = replace(plan, scaling=replace(plan.scaling, drive=members.axes.drive))
+        columns = members.columns(candidates)
+        for key, number, column in zip(members.keys, members.exact(int(candidates[0])), columns, strict=True):
+            path = Path.of(key)
+            if not isinstance(path.get(config), ExactNumber):
+                raise Untraceable(f"what is swept, {key}, is no number")
+            config = path.with_number(
+                config, SweptExact(Swept(context, partial(np.asarray, column)), number), context
+            )
+        scene = build_scene(replace(experiment, config=config), context)
+        check_start(scene)
+        return Family(prepared, scene, plan, candidates)

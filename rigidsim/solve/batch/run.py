@@ -16,7 +16,7 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.model.tangents import GROWTH
-from rigidsim.solve.batch.family import Family, Numbers
+from rigidsim.solve.batch.family import Family
 from rigidsim.solve.compiled import compiled_function, evaluate_rows
 from rigidsim.solve.events import BESIDE, STATES, TIMES, exponents_of
 from rigidsim.solve.lanes import BatchEngine, LaneResults, recommended_width
@@ -76,11 +76,11 @@ class BatchBlock:
 
 
 class BatchRun:
-    """Runs a family's members with what is compiled once; by default with the processor's own width."""
+    """Runs a family's members; by default with the processor's own width."""
 
     def __init__(self, family: Family, width: int | None = None) -> None:
         self.width = width or recommended_width()
-        self._traced, self._system = family.traced, family.traced.system
+        self._family, self._system = family, family.system
         self._clocks: dict[int, SampleClock] = {}
         system = self._system
         self._crossings = [hy.expression(c.expression) for c in system.crossings]
@@ -100,20 +100,21 @@ class BatchRun:
         if self._growth:
             self._compiled(self._growth, along=True)
 
-    def blocks(self, numbers: Numbers) -> Iterator[BatchBlock]:
-        """Run members of this family, as many at a time as fit into memory."""
-        samples = self._traced.prepared.clock.count
+    def blocks(self) -> Iterator[BatchBlock]:
+        """Run the members, as many at a time as fit into memory."""
+        samples = self._family.prepared.clock.count
         each = samples * (len(self._system.states) + len(self._system.outputs))
         most = max(_VALUES_AT_ONCE // each // self.width, 1) * self.width
         # members with about as many steps run side by side, so that none waits for long
-        order = np.argsort(numbers.doubles(self._system.rate_bound), kind="stable")
+        order = np.argsort(self._family.doubles(self._system.rate_bound), kind="stable")
         for first in range(0, len(order), most):
-            yield self._block(numbers, order[first : first + most])
+            yield self._block(order[first : first + most])
 
-    def _block(self, numbers: Numbers, part: np.ndarray) -> BatchBlock:
-        initial, swept = numbers.initial[:, part], numbers.parameters[:, part]
-        moving, read = initial[: self._traced.moving], swept[self._traced.in_equations]
-        start, times = self._times(numbers.whole_numbers(self._system.scaling.time)[part])
+    def _block(self, part: np.ndarray) -> BatchBlock:
+        family = self._family
+        initial, swept = family.initial[:, part], family.parameters[:, part]
+        moving, read = initial[: self._family.moving], swept[self._family.in_equations]
+        start, times = self._times(family.whole_numbers(self._system.scaling.time)[part])
         most = self._most_steps(start, times)
         parameters = np.concatenate([read, self._of_events(moving, swept, start, times[-1])])
         lanes, along = self._plain.run(moving, parameters, start, times, most), None
@@ -121,13 +122,13 @@ class BatchRun:
             along = self._along.run(initial, read, start, times, most).states
         begun = self._evaluated(self._components, moving[None], swept, start[None])[:, 0]
         found = self._outputs(lanes.states, swept, times, begun, along)
-        values, first = self._in_si(found, numbers, part), len(found) - len(self._system.invariants)
-        self._join(values, numbers, part)
+        values, first = self._in_si(found, part), len(found) - len(self._system.invariants)
+        self._join(values, part)
         drifts = {f"{one.name}_drift": found[first + n] for n, one in enumerate(self._system.invariants)}
         block = BatchBlock(
-            numbers.members[part],
+            family.members[part],
             part,
-            self._traced.prepared.clock.labels(0, len(times)),
+            self._family.prepared.clock.labels(0, len(times)),
             start,
             times,
             lanes.states,
@@ -136,8 +137,8 @@ class BatchRun:
             self._status(lanes, most),
             _reached(lanes),
             lanes.steps,
-            self._traced.prepared.drift_bound(lanes.steps),
-            self._events(lanes, swept, numbers, part, begun),
+            self._family.prepared.drift_bound(lanes.steps),
+            self._events(lanes, swept, part, begun),
             self.width,
         )
         self._ended_by_events(block)
@@ -148,8 +149,8 @@ class BatchRun:
 
     def _engine(self, states: int, events: Sequence[tuple[Any, int]] = ()) -> BatchEngine:
         """Batch integrator of the first states of the system."""
-        system, tolerance = self._system, self._traced.prepared.tolerance
-        rights = self._traced.as_parameters([right for _, right in system.equations[:states]])
+        system, tolerance = self._system, self._family.prepared.tolerance
+        rights = self._family.as_parameters([right for _, right in system.equations[:states]])
         equations = list(zip(system.variables[:states], rights, strict=True))
         loose = None if tolerance is None else float(tolerance)
         return BatchEngine(equations, self.width, events=events, tolerance=loose, compact=system.wide)
@@ -157,17 +158,17 @@ class BatchRun:
     @cached_property
     def _plain(self) -> BatchEngine:
         """The motion; each event has a shift and a factor as parameters after the equations' own."""
-        expressions, first = self._traced.as_parameters(self._crossings), len(self._traced.in_equations)
+        expressions, first = self._family.as_parameters(self._crossings), len(self._family.in_equations)
         events = [
             ((expression + hy.par[first + 2 * n]) * hy.par[first + 2 * n + 1], crossing.direction)
             for n, (expression, crossing) in enumerate(zip(expressions, self._system.crossings, strict=True))
         ]
-        return self._engine(self._traced.moving, events)
+        return self._engine(self._family.moving, events)
 
     @cached_property
     def _along(self) -> BatchEngine | None:
         states = len(self._system.states)
-        return self._engine(states) if states > self._traced.moving else None
+        return self._engine(states) if states > self._family.moving else None
 
     def _of_events(
         self, initial: np.ndarray, swept: np.ndarray, start: np.ndarray, end: np.ndarray
@@ -193,7 +194,7 @@ class BatchRun:
 
     def _times(self, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Start (m,) and samples (samples, m) in each member's internal unit of time."""
-        start, columns = np.empty(len(units)), np.empty((self._traced.prepared.clock.count, len(units)))
+        start, columns = np.empty(len(units)), np.empty((self._family.prepared.clock.count, len(units)))
         for unit in np.unique(units).tolist():
             if unit not in self._clocks:
                 scaling = replace(self._system.scaling, time=unit)
@@ -204,13 +205,13 @@ class BatchRun:
         return start, columns
 
     def _most_steps(self, start: np.ndarray, times: np.ndarray) -> int:
-        asked = self._traced.prepared.scene.config.limits.max_steps
+        asked = self._family.prepared.scene.config.limits.max_steps
         longest = float((times[-1] - start).max())
         given_up = _MOST_STEPS + int(min(_STEPS_PER_UNIT * longest, 1e12))
         return given_up if asked is None else min(int(asked), given_up)
 
     def _status(self, lanes: LaneResults, most: int) -> np.ndarray:
-        asked = self._traced.prepared.scene.config.limits.max_steps
+        asked = self._family.prepared.scene.config.limits.max_steps
         short = Status.MAX_STEPS if asked is not None and most == int(asked) else None
         found = np.full(len(lanes.arrived), Status.FINISHED, dtype=object)
         found[~lanes.arrived] = short
@@ -220,7 +221,7 @@ class BatchRun:
     # --- events and guards ----------------------------------------------------------------------------------
 
     def _events(
-        self, lanes: LaneResults, swept: np.ndarray, numbers: Numbers, part: np.ndarray, begun: np.ndarray
+        self, lanes: LaneResults, swept: np.ndarray, part: np.ndarray, begun: np.ndarray
     ) -> list[BatchEvents]:
         events, scaling = [], self._system.scaling
         for index, crossing in enumerate(self._system.crossings):
@@ -229,8 +230,8 @@ class BatchRun:
             place, times = np.array([m for m, _ in rows], dtype=np.int64), np.array([f.time for _, f in rows])
             states = np.array([f.state for _, f in rows]).reshape(len(rows), lanes.states.shape[1])
             at = self._outputs(states.T[None], swept[:, place], times[None], begun[:, place])
-            values = {name: x[0] for name, x in self._in_si(at, numbers, part[place]).items()}
-            units = numbers.whole_numbers(scaling.time)[part[place]]
+            values = {name: x[0] for name, x in self._in_si(at, part[place]).items()}
+            units = self._family.whole_numbers(scaling.time)[part[place]]
             events.append(
                 BatchEvents(crossing.name, place, scaling.direction * np.ldexp(times, units), values)
             )
@@ -255,7 +256,7 @@ class BatchRun:
 
     def _ended_by_drift(self, block: BatchBlock) -> None:
         """Apply the guard max_drift: the first sample beyond it is the last."""
-        limit = self._traced.prepared.scene.config.limits.max_drift
+        limit = self._family.prepared.scene.config.limits.max_drift
         if limit is None or not block.drifts:
             return
         beyond = block.largest_drifts() > float(limit)
@@ -282,24 +283,24 @@ class BatchRun:
             found[self._of_tangents] = self._evaluated(self._growth, along, swept, times)
         return found
 
-    def _in_si(self, found: np.ndarray, numbers: Numbers, members: np.ndarray) -> Values:
+    def _in_si(self, found: np.ndarray, members: np.ndarray) -> Values:
         """Outputs as recorded variables (samples, m, components), SI."""
         values: Values = {}
         for variable in self._system.recorded:
             columns = [
-                np.ldexp(found[variable.first + k], numbers.whole_numbers(exponent)[members])
+                np.ldexp(found[variable.first + k], self._family.whole_numbers(exponent)[members])
                 for k, exponent in enumerate(variable.exponents)
             ]
             values[variable.name] = np.stack(columns, axis=2)
         return values
 
-    def _join(self, values: Values, numbers: Numbers, part: np.ndarray) -> None:
+    def _join(self, values: Values, part: np.ndarray) -> None:
         """Give each quaternion the sign nearest to the one before, as in a single run."""
         for variable in self._system.recorded:
             if variable.continuity != "nearest":
                 continue
             block = values[variable.name]
-            begin = [numbers.doubles(x)[part] for x in self._system.scene.quaternion]
+            begin = [self._family.doubles(x)[part] for x in self._system.scene.quaternion]
             before = np.concatenate([np.stack(begin, axis=1)[None], block[:-1]])
             products = np.einsum("smc,smc->sm", block, before)
             signs = np.cumprod(np.where(products < 0, -1.0, 1.0), axis=0)
@@ -307,8 +308,8 @@ class BatchRun:
 
     def _compiled(self, expressions: Sequence[Any], along: bool = False) -> tuple[Any, list[int]]:
         """A compiled function of states, and the indices of the states and parameters that it takes."""
-        states = len(self._system.states) if along else self._traced.moving
-        variables = [*self._system.variables[:states], *self._traced.parameters.variables]
+        states = len(self._system.states) if along else self._family.moving
+        variables = [*self._system.variables[:states], *self._family.variables]
         names = set(hy.get_variables([hy.expression(x) for x in expressions]))
         read = [n for n, variable in enumerate(variables) if str(variable) in names] or [0]
         taken = [variables[n] for n in read]
@@ -327,7 +328,7 @@ class BatchRun:
         samples, count, m = states.shape
         if not expressions or not times.size:
             return np.empty((len(expressions), samples, m))
-        function, read = self._compiled(expressions, count > self._traced.moving)
+        function, read = self._compiled(expressions, count > self._family.moving)
         # parameters of members are inputs like their states
         every = (samples, m)
         rows = [states[:, n] if n < count else np.broadcast_to(swept[n - count], every) for n in read]

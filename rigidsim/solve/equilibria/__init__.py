@@ -11,7 +11,7 @@ from typing import Any
 
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.starts import ATTITUDES, EQUILIBRIA, InitialRotation, StartForm, refusal, register_start
-from rigidsim.scene.tracing import TracingContext, Untraceable
+from rigidsim.scene.swept import SweptContext, Untraceable
 from rigidsim.solve.equilibria.cassini import cassini_state
 from rigidsim.solve.equilibria.relative import relative_equilibrium
 from rigidsim.solve.equilibria.search import NoEquilibrium
@@ -23,7 +23,7 @@ _known: OrderedDict[Any, InitialRotation] = OrderedDict()
 
 
 def _once(name: str, find: Callable[[Scene], InitialRotation], scene: Scene) -> InitialRotation:
-    if isinstance(scene.context, TracingContext):
+    if isinstance(scene.context, SweptContext):
         raise Untraceable("an equilibrium that is found")
     tables = {name: table for name, table in scene.config if name not in _BESIDE}
     key = scene.context.prec, repr(tables)

@@ -24,7 +24,7 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import parse_number
 from rigidsim.scene.readable import span_text
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.tracing import plain
+from rigidsim.scene.swept import plain
 from rigidsim.session.session import Tuning
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.folder import RunFolder

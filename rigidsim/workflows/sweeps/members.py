@@ -28,7 +28,6 @@ from rigidsim.session.dataset import dataset_variables, kernel_attributes
 from rigidsim.solve.batch.family import (
     AxisNumbers,
     Families,
-    Family,
     Members,
     NotBatchable,
     Sorted,
@@ -445,9 +444,6 @@ _LOOKED_AT, _COUNTED = 64, 4096  # members by which a sweep is judged, by their 
 _MOST_KINDS, _LEAST_MEMBERS = 64, 8
 """Up to so many kinds of members have batches however few members they have; more need so many each."""
 _MOST_AHEAD = 4  # families compiled before the first tile
-_MOST_HELD = 256  # families
-_MOST_UNTRACED = 8
-"""Members that can't be traced after which a check leaves the others to their runs: each takes as long."""
 
 
 Part = tuple[np.ndarray, MemberResults]
@@ -470,28 +466,12 @@ def why_alone(sweep: Sweep, keep: Sequence[str]) -> str:
     return "" if reason is None else reason.name.lower()
 
 
-@dataclass(frozen=True)
-class _FamilyRun:
-    """What is compiled for a family, and the variables that its members record."""
-
-    family: Family
-    run: BatchRun
-    variables: list[Variable]
-
-    @cached_property
-    def estimates(self) -> MemberEstimates:
-        """Estimates of its members' errors."""
-        return MemberEstimates(self.family, self.run.width)
-
-
 class BatchTiles:
-    """Families of a sweep, traced and compiled once per process."""
+    """Members of a sweep in batches; what is compiled for a family is kept by the process."""
 
     def __init__(self, sweep: Sweep) -> None:
         self._sweep = sweep
         self.axes = AxisNumbers(sweep)
-        self._known: list[Family] = []
-        self._runs: dict[int, _FamilyRun] = {}
 
     @cached_property
     def alone(self) -> NotBatchable | None:
@@ -503,7 +483,7 @@ class BatchTiles:
         kinds, looked_at = self._kinds()
         if kinds > _MOST_KINDS and kinds * _LEAST_MEMBERS > looked_at:
             return NotBatchable.FAMILIES
-        _, found = self._sample
+        found = self._sample
         if found.alone and not found.groups:
             return found.alone[min(found.alone)]
         many = self._sweep.count > _LOOKED_AT and 2 * len(found.groups) > _LOOKED_AT
@@ -512,7 +492,7 @@ class BatchTiles:
     def _kinds(self) -> tuple[int, int]:
         """Number of kinds (see ``Members``) among some members, and the number of these."""
         sweep = self._sweep
-        apart = [place for place in range(len(sweep.axes)) if not self.axes.traced(place)]
+        apart = [place for place in range(len(sweep.axes)) if not self.axes.swept(place)]
         if sweep.product or not apart:
             return math.prod(sweep.axes[place].count for place in apart), sweep.count
         some = np.arange(0, sweep.count, -(-sweep.count // _COUNTED))
@@ -520,31 +500,20 @@ class BatchTiles:
         return len(np.unique(codes, axis=1).T), len(some)
 
     @cached_property
-    def _sample(self) -> tuple[range, Sorted]:
+    def _sample(self) -> Sorted:
         """Members from all over the sweep, sorted."""
-        some = range(0, self._sweep.count, -(-self._sweep.count // _LOOKED_AT))
-        return some, self._sorted(some, most_untraced=_MOST_UNTRACED)
+        return self._sorted(range(0, self._sweep.count, -(-self._sweep.count // _LOOKED_AT)))
 
-    def _sorted(
-        self, members: Sequence[int], most_refused: int | None = None, most_untraced: int | None = None
-    ) -> Sorted:
-        if len(self._known) > _MOST_HELD:  # whoever represents a family, it has the same numbers
-            self._known.clear()
-            self._runs.clear()
-        families = Families(Members(self._sweep, members, self.axes), most_refused, most_untraced)
-        families.known = self._known
-        return families.sort()
+    def _sorted(self, members: Sequence[int], most_refused: int | None = None) -> Sorted:
+        return Families(Members(self._sweep, members, self.axes), most_refused).sort()
 
     def compile(self) -> None:
-        """Trace and compile what members from all over the sweep need."""
-        if self.alone is not None:
-            return
-        some, found = self._sample
-        for family, numbers in found.groups[:_MOST_AHEAD]:
-            compiled = self._run_of(family, some[int(numbers.members[0])])
-            compiled.run.compile()
+        """Compile what members from all over the sweep need."""
+        for family in self._sample.groups[:_MOST_AHEAD] if self.alone is None else ():
+            run = BatchRun(family)
+            run.compile()
             if self._estimated:
-                compiled.estimates.compile()
+                MemberEstimates(family, run.width).compile()
 
     def run(
         self, members: Sequence[int], keep: Sequence[str], alone: bool | None = None
@@ -564,17 +533,18 @@ class BatchTiles:
         for place, error in found.refused.items():
             reason = "; ".join(str(problem) for problem in error.problems)
             parts.append((np.array([place]), failed(Outcome.REFUSED, reason)))
-        for family, numbers in found.groups:
-            compiled = self._run_of(family, int(members[int(numbers.members[0])]))
-            for block in compiled.run.blocks(numbers):
+        for family in found.groups:
+            batch = BatchRun(family)
+            estimates = MemberEstimates(family, batch.width) if self._estimated else None
+            variables = [v for v in dataset_variables(family.prepared) if "units" in v.attributes]
+            for block in batch.blocks():
                 before = time.process_time()
-                errors = compiled.estimates.of(numbers, block) if self._estimated else None
+                errors = estimates.of(block) if estimates is not None else None
                 spent = time.process_time() - before
                 done = np.array([status is not None for status in block.status], dtype=bool)
                 if done.any():
-                    parts.append(
-                        (block.members[done], self._results(compiled, block, errors, done, keep, spent))
-                    )
+                    results = self._results(variables, block, errors, done, keep, spent)
+                    parts.append((block.members[done], results))
                 if not done.all():
                     left += block.members[~done].tolist()
                     why = why or "gave_up"
@@ -584,28 +554,21 @@ class BatchTiles:
         """Members that no run accepts, up to ``most``, why, and how many share equations and can be run."""
         if self.alone is not None:
             return {}, 0
-        found = self._sorted(members, most, _MOST_UNTRACED)
-        accepted = sum(len(numbers.members) for _, numbers in found.groups)
+        found = self._sorted(members, most)
+        accepted = sum(len(family.members) for family in found.groups)
         return {int(members[place]): error for place, error in found.refused.items()}, accepted
-
-    def _run_of(self, family: Family, member: int) -> _FamilyRun:
-        if id(family) not in self._runs:
-            prepared = prepare(self._sweep.worked_out(member))
-            variables = [v for v in dataset_variables(prepared) if "units" in v.attributes]
-            self._runs[id(family)] = _FamilyRun(family, BatchRun(family), variables)
-        return self._runs[id(family)]
 
     @property
     def _estimated(self) -> bool:
         return self._sweep.base.config.output.estimate
 
     def _results(
-        self, compiled: _FamilyRun, block: BatchBlock, errors: MemberErrors | None, done: np.ndarray,
+        self, variables: Sequence[Variable], block: BatchBlock, errors: MemberErrors | None, done: np.ndarray,
         keep: Sequence[str], estimating: float,
     ) -> MemberResults:  # fmt: skip
         """Results of those members of a block that are ``done``."""
         sweep = self._sweep
-        kept = _kept(block, compiled.variables, keep, sweep.table.most_events, sweep.added)
+        kept = _kept(block, variables, keep, sweep.table.most_events, sweep.added)
         over = block.largest_drifts().max(axis=0) > block.drift_bound
         warned = {WarningCode.DRIFT: over, WarningCode.UNDEFINED: _lost(block)}
         if errors is not None:
@@ -754,13 +717,13 @@ def run_members(
 
 @lru_cache(maxsize=4)
 def batches_of(config: str, source: str) -> BatchTiles:
-    """The families of a config's sweep, traced once per process."""
+    """The batches of a config's sweep, looked at once per process."""
     sweep = sweep_of(config, source)
     return BatchTiles(sweep)
 
 
 def get_ready(config: str, source: str) -> None:
-    """Trace and compile in this process what most members of a config's sweep need; nothing is integrated."""
+    """Compile in this process what most members of a config's sweep need; nothing is integrated."""
     sweep = sweep_of(config, source)
     if not why_alone(sweep, sweep.table.keep):
         batches_of(config, source).compile()

@@ -68,7 +68,7 @@ def blocks_of(
     """All members, run with options of ``BatchRun``."""
     found = Families(Members(sweep, members)).sort()
     assert not found.alone
-    return [b for family, numbers in found.groups for b in BatchRun(family, width, **options).blocks(numbers)]
+    return [b for family in found.groups for b in BatchRun(family, width, **options).blocks()]
 
 
 def by_member(blocks: list[BatchBlock]) -> dict[int, tuple[dict[str, np.ndarray], int, Status | None]]:
