@@ -287,6 +287,7 @@ def angle(one: Vectors, other: Vectors) -> float:
 
 
 def apart(one: Vectors, other: Vectors) -> Any:
-    """Largest distance, mpf."""
+    """Largest distance, mpf, with every digit of both whatever the caller works with."""
     pairs = zip(one, other, strict=True)
-    return max(mpmath.norm([mpmath.mpf(a) - b for a, b in zip(p, q, strict=True)]) for p, q in pairs)
+    with mpmath.workdps(60):
+        return max(mpmath.norm([mpmath.mpf(a) - b for a, b in zip(p, q, strict=True)]) for p, q in pairs)

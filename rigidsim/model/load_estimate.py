@@ -58,6 +58,7 @@ _HALVINGS = 8
 _NEWTON = 40  # iterations, each of which halves the distance to a double zero
 _CLOCK = "t_of_drive"
 _OPPOSITE = 16  # states at which q and -q are compared
+_ROUNDINGS = 8.0  # of the states, as they are drawn, in a sum of some terms that cancel
 _ROUNDING = 1e-9  # of the largest component: far above rounding, far below any load that means its sign
 
 Function = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -239,6 +240,11 @@ class _Trial:
         context, scaling = m.scene.context, m.scaling
         times = self._moments(states)
         sampled = self.over(self.whole, times, states)
+        rounding = 1 + np.finfo(float).eps * np.random.default_rng(0).uniform(-1, 1, states.shape)
+        off = np.abs(self.over(self.whole, times[:1], states * rounding) - sampled[:, :1])
+        for part, noise in zip(sampled.reshape(6, -1), off.reshape(6, -1), strict=True):
+            if np.abs(part).max() <= _ROUNDINGS * noise.max():  # as at a rest, where terms cancel
+                part[:] = 0.0
         torque, inner, pushed, torque_change, inner_change, pushed_change = sampled.reshape(
             6, 3, *sampled.shape[1:]
         )

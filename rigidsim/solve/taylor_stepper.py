@@ -220,11 +220,12 @@ class TaylorStepper(Stepper):
 
     def _within_piece(self, count: int, end: Scalar | None, samples: SamplesWithin | None) -> bool:
         """Take steps, none beyond a time: by the engine's own grid, which has the same bits and costs half,
-        where that takes no other steps, as it would from a time that is two numbers.
+        where that takes no other steps, as it would from a time that is two numbers, and no sample was found
+        in the piece before.
         """
         engine, before = self._integrator, self._integrator.dtime
         plain = end is None and not self._requirement.each and before[1] == 0
-        if samples is None or not plain or count < _LEAST_GRID:
+        if samples is None or len(samples.states) or not plain or count < _LEAST_GRID:
             return self._propagate(end, count, samples)
         times = samples.times
         first = int(times[0] == before[0])

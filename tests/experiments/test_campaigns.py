@@ -4,10 +4,11 @@ import random
 import time
 from pathlib import Path
 
+import mpmath
 import pytest
 
 from experiments import error_coverage
-from experiments.coverage.judging import Judged
+from experiments.coverage.judging import Judged, apart
 from experiments.durability.judging import Tally
 from experiments.durability.sweeps import WAYS, disturb_sweeps
 
@@ -33,3 +34,10 @@ def test_broken_promises_are_found() -> None:
     assert any("digits said to be gone" in line and "[201]" in line for line in alarmed)
     wide = [judged(1e-12, 1e-9, number=n) for n in range(200)]
     assert any("median announced over true" in line for line in error_coverage.broken_promises(wide))
+
+
+def test_places_are_compared_in_all_their_digits() -> None:
+    """An error of 3e-19 was judged as 2.2e-16, the last bit of a double."""
+    with mpmath.workdps(40):
+        one, other = mpmath.mpf(1) / 3, mpmath.mpf(1) / 3 + mpmath.mpf("3e-19")
+    assert float(apart([[one]], [[other]])) == pytest.approx(3e-19, rel=1e-9)
