@@ -15,13 +15,13 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, required
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load_words import length_text, value_text
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.sources import flown_about, read_in
 from rigidsim.model.two_part import rounded
-from rigidsim.scene.arithmetic import apply
+from rigidsim.scene.arithmetic import Matrix, apply
 from rigidsim.scene.bodies.presets import EARTH
 from rigidsim.scene.earth_axes import earth_axes, rotation_rate
 from rigidsim.scene.expressions.names import PLACES, NameProvider, Readable, provides
@@ -75,13 +75,8 @@ def height(m: Kinematics) -> Symbolic:
 
 def _geodetic_at_start(scene: Scene) -> list[float]:
     """Altitude (km), latitude and longitude (rad) of the body; refused where the model doesn't hold."""
-    _check(scene)
-    context, source = scene.context, flown_about(scene.config)
-    assert source is not None
-    assert scene.epoch is not None
-    assert scene.axes is not None
-    place = [-x for x in source.of(scene).source_at_start(scene)]
-    x, y, z = apply(earth_axes(scene.epoch, scene.axes, context), place)
+    context, (source, rows) = scene.context, _known(scene)
+    x, y, z = apply(rows, [-x for x in source.source_at_start(scene)])
     turned = rotation_rate(context) * scene.start
     c, s = context.cos(turned), context.sin(turned)
     fixed = [float(plain(e)) / 1e3 for e in (c * x + s * y, c * y - s * x, z)]
@@ -120,17 +115,12 @@ def _geodetic(m: Kinematics) -> list[Symbolic]:
     """Altitude (km), latitude and longitude (rad)."""
     key = ("geodetic",)
     if key not in m.made:
-        _check(m.scene)
-        context, source = m.scene.context, flown_about(m.scene.config)
-        assert source is not None
-        assert m.scene.epoch is not None
-        assert m.scene.axes is not None
-        place = source.of(m.scene).source_place(m)
+        source, rows = _known(m.scene)
+        place = source.source_place(m)
         far = _number(m, place.unit / 1000) / place.inverse
         space = [-far * x for x in place.direction]
-        rows = earth_axes(m.scene.epoch, m.scene.axes, context)
         x, y, z = (hy.sum([e * a for e, a in zip(m.fixed(row), space, strict=True)]) for row in rows)
-        angle = m.scaled(rotation_rate(context), m.scaling.time) * hy.time
+        angle = m.scaled(rotation_rate(m.scene.context), m.scaling.time) * hy.time
         c, s = hy.cos(angle), hy.sin(angle)
         m.made[key] = hy.model.cart2geo([c * x + s * y, c * y - s * x, z], R_eq=_EQUATOR)
     return m.made[key]
@@ -148,13 +138,14 @@ def _indices(scene: Scene) -> list[Any]:
 
 def _day(scene: Scene) -> float:
     """Days of UTC since the year's begin at time 0."""
-    assert scene.epoch is not None
-    days = float(scene.epoch.universal_date()) - _ORDINAL_0
+    days = float(required(scene.epoch).universal_date()) - _ORDINAL_0
     return days - date(date.fromordinal(int(days)).year, 1, 1).toordinal()
 
 
-def _check(scene: Scene) -> None:
-    """Refuse what the model can't be worked out for."""
+def _known(scene: Scene) -> tuple[Any, Matrix]:
+    """The load about whose source the air is, and the Earth's axes at time 0 as rows; what the model can't be
+    worked out for is refused.
+    """
     given = f'given "{NRLMSISE}", '
     known = (
         ("[time] epoch", scene.epoch, 'epoch = "2026-01-01T00:00:00 UTC"'),
@@ -163,21 +154,22 @@ def _check(scene: Scene) -> None:
     for what, found, example in known:
         if found is None:
             raise _fault(scene, f"{given}a model of date and place, which takes {what}; give {example}")
-    assert scene.epoch is not None
+    epoch, axes = required(scene.epoch), required(scene.axes)
     try:
-        scene.epoch.universal_date()
+        epoch.universal_date()
     except ValueError as error:
-        raise _fault(scene, f"{given}at {scene.epoch}, but {error}; give a later epoch") from None
+        raise _fault(scene, f"{given}at {epoch}, but {error}; give a later epoch") from None
     first, *others = _asking(scene.config)
     if any(getattr(x, key) != getattr(first, key) for x in others for key in INDICES):
         raise _fault(
             scene, f"{given}by several loads with different {', '.join(INDICES)}; give them the same"
         )
-    source = flown_about(scene.config)
-    strength = None if source is None else source.of(scene).gravitational_parameter
+    source = required(flown_about(scene.config)).of(scene)
+    strength = source.gravitational_parameter
     if strength is not None and not EARTH.attracts_by(strength):
         what = f"the Earth's air, where {value_text(strength, 'm^3/s^2')} attracts the body, which isn't the "
         raise _fault(scene, f"{given}{what}Earth; give density, altitude and scale_height of its air")
+    return source, earth_axes(epoch, axes, scene.context)
 
 
 def _fault(scene: Scene, text: str) -> ConfigError:

@@ -34,7 +34,7 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, required
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.placements import OrbitPlane, flight_plane, kepler_plane, table_plane
@@ -262,9 +262,7 @@ def jacobi_constant(m: Mechanics) -> Symbolic:
 def _from_obliquity(scene: Scene) -> InitialRotation:
     """The attitude of the node on the reference plane and of the obliquity, as the observables."""
     table, context = scene.config.initial, scene.context
-    assert table.obliquity is not None
-    assert table.node_longitude is not None
-    tilt, node = table.obliquity.at(context), table.node_longitude.at(context)
+    tilt, node = (required(x).at(context) for x in (table.obliquity, table.node_longitude))
     if not 0 <= tilt <= context.pi * (1 + negligible(context)):
         raise angle_out_of_range("obliquity", "", context, tilt, "0 to 180 deg")
     normal = initial_normal(scene, loads_of(scene))

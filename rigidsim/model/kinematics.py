@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 
 import heyoka as hy
 
+from rigidsim.errors import required
 from rigidsim.model.orbits import (
     KernelStates,
     OrbitStates,
@@ -302,14 +303,12 @@ class Kinematics:
     @staticmethod
     def carried(part: T | None) -> T:
         """The part itself, which the caller knows to be carried (because ``Observable.needs`` says so)."""
-        assert part is not None
-        return part
+        return required(part)
 
     @property
     def matrix(self) -> SymbolicMatrix:
         """Rotation matrix R, body to space axes."""
-        assert self.attitude is not None
-        return self.attitude.matrix
+        return required(self.attitude).matrix
 
     def seen_from(self, point: Vector) -> tuple[list[Symbolic], Symbolic]:
         """Direction (unit, space axes) from a fixed point (mpf, m) to the body in flight; 1 / distance."""

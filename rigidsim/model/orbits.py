@@ -68,6 +68,7 @@ from typing import Any, Protocol
 import heyoka as hy
 import numpy as np
 
+from rigidsim.errors import required
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder, Scaling
 from rigidsim.model.state_blocks import StateBlock
@@ -662,8 +663,7 @@ class PointMassPair:
     @property
     def host(self) -> int:
         """Index of the one that the body is."""
-        assert self.masses.host is not None
-        return self.masses.host
+        return required(self.masses.host)
 
     @property
     def place(self) -> Vector:

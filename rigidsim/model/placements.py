@@ -370,8 +370,9 @@ class PlacedOnOrbit(Placement):
 
     def motion(self, m: Kinematics) -> SourceMotion:
         states = m.orbit(self.orbit)
-        assert states.parts is not None
-        return SourceMotion(*states.parts.motions(), states.inverse_distance, self.orbit.semi_major_axis)
+        return SourceMotion(
+            *m.carried(states.parts).motions(), states.inverse_distance, self.orbit.semi_major_axis
+        )
 
     def motion_at_start(self, scene: Scene) -> tuple[Vector, Vector, Vector]:
         axis, found = self.orbit.semi_major_axis, KeplerParts.at(self.orbit, scene.context, scene.start)

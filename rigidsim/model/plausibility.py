@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import Any
 
+from rigidsim.errors import required
 from rigidsim.model.load import Load
 from rigidsim.model.load_words import ASTRONOMICAL_UNIT, length_text, span_words
 from rigidsim.scene import attitude
@@ -35,6 +36,7 @@ _PERTURBED = 0.05
 """Relative difference of n^2 a^3 from G M that perturbations explain: the Moon's by the Sun is 0.0075, of
 inner moons of Saturn by its flattening 0.025.
 """
+
 _SLOW = 0.05  # of the circular speed: a slower body falls almost straight down
 _UNBOUND = math.sqrt(2.0)  # of the circular speed
 _UNITS = (("km", 1e3), ("au", ASTRONOMICAL_UNIT))
@@ -193,8 +195,7 @@ def _about_orbit(
     table: Elements, orbit: KeplerOrbit, strength: ExactNumber | None, where: str, scene: Scene
 ) -> Iterator[Caution]:
     """A prescribed orbit as given (``table``) and in numbers: its units, its altitude, and its period."""
-    given, axis = table.semi_major_axis, float(orbit.semi_major_axis)
-    assert given is not None
+    given, axis = required(table.semi_major_axis), float(orbit.semi_major_axis)
     if strength is None:
         size = float(orbit.mean_motion**2 * orbit.semi_major_axis**3)
         body = _alike(size) or (_in_kilometres(size, axis) if given.assumed else None)

@@ -118,8 +118,7 @@ class Probe(Mechanics):
 
     def guess(self) -> Any:
         """An arbitrary number."""
-        assert self.draw is not None
-        return hy.expression(self.number(self.scene.context.mpf(self.draw.gauss(0, 1))))
+        return hy.expression(self.number(self.scene.context.mpf(self.carried(self.draw).gauss(0, 1))))
 
     def added(self, terms: Iterable[Term]) -> Acting | None:
         """The sum of terms; None if they aren't numbers."""
@@ -141,8 +140,7 @@ class Probe(Mechanics):
             return None
         if terms and found[1] == 0:  # perhaps in this state alone
             return None
-        assert self.turn is not None
-        total, size = apply(self.turn, found[0]), found[1]
+        total, size = apply(self.carried(self.turn), found[0]), found[1]
         if about is None or self.place is None:
             return total, size
         if (force := self.added(force_terms(load, self))) is None:

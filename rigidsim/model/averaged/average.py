@@ -45,7 +45,7 @@ from typing import Any, Self
 import heyoka as hy
 import numpy as np
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, required
 from rigidsim.model.averaged.free_motion import (
     ORDERS,
     FreeMotion,
@@ -78,6 +78,7 @@ LIBRATION = 2.0
 """Least distance of a frequency combination from zero, in half-widths of libration: motions near the
 separatrix dwell, and the widths of neighbouring resonances add up.
 """
+
 AXIAL = 0.1
 """Angle (rad) between momentum and circled axis up to which that axis has a mean direction: it is along the
 momentum, and the whole angle is part of what averaging leaves out.
@@ -872,9 +873,8 @@ class Average:
             return strength * spread / (self.motion.momentum * self.driven.least) + own
         found = sum(abs(self.rate(source)) * source.nearest for source in self.sources)
         if self.resonance is not None:
-            assert self.slow is not None
             found += 4 * self.resonance.strength * self.resonance.source.nearest / self.motion.momentum
-            beyond = sum(abs(x) for x in self.slow.momentum)
+            beyond = sum(abs(x) for x in required(self.slow).momentum)
             found += 2 * self.resonance.libration_rate + beyond / self.motion.moments[0]
         return found
 

@@ -46,6 +46,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from rigidsim.errors import required
 from rigidsim.model.averaged.free_motion import FreeMotion
 from rigidsim.model.averaged.sources import Source
 from rigidsim.scene import attitude
@@ -56,6 +57,7 @@ from rigidsim.scene.scene import Scene
 
 _POINTS = ((0.3, 64), (0.6, 256), (1.0, 8192))
 """Points per turn up to an eccentricity; harmonics beyond are below double precision up to 0.6."""
+
 _TILTS, _PHASES = 6, 8  # a quadrature over orientations that is exact for harmonics of fourth degree
 _STEP = 1e-20  # of derivatives in the complex plane
 _MOST_POINTS = 256  # per turn, for the second order
@@ -249,8 +251,7 @@ class Resonance:
     @property
     def orbit(self) -> KeplerOrbit:
         """The source's orbit."""
-        assert self.source.of.orbit is not None
-        return self.source.of.orbit
+        return required(self.source.of.orbit)
 
     @property
     def name(self) -> str:

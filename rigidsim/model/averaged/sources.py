@@ -39,6 +39,7 @@ from typing import Any, Self
 import heyoka as hy
 import numpy as np
 
+from rigidsim.errors import required
 from rigidsim.model.load import Load
 from rigidsim.model.loads.gravity import Attraction
 from rigidsim.model.orbits import ElementStates
@@ -214,12 +215,11 @@ class OrbitTerms:
         return [g + more * ((x * x - y * y) * n + 2.0 * (z * (x * a - y * b))) for g, n, a, b in towards]
 
     def nutation(self, rate: Any, s: list[Symbolic]) -> list[Symbolic]:
-        """See ``orbit_terms.nutation``; ``rate`` as above."""
-        assert self.place is not None
-        root = self.ellipse.root
+        """See the function ``nutation``; ``rate`` as above."""
+        root, place = self.ellipse.root, required(self.place)
         size = self._times(rate / 2, self.cubed / (self.ellipse.motion * (root * root * root)))
         given = isinstance(root, hy.expression)
-        return nutation(hy, self.ellipse, self.place, size, s, (lambda x: x) if given else self.number)
+        return nutation(hy, self.ellipse, place, size, s, (lambda x: x) if given else self.number)
 
 
 @dataclass(frozen=True)
@@ -280,8 +280,7 @@ class Source:
             square = found["k"] ** 2 + found["h"] ** 2
             root = context.sqrt(1 - square)
             return Ellipse(context.sqrt(square), square, root, self.of.table.motion(found[AXIS]), False)
-        assert self.of.orbit is not None
-        return Ellipse.of(context, self.of.orbit)
+        return Ellipse.of(context, required(self.of.orbit))
 
     def secular_strength(self, context: Any) -> Any:
         """3 G M / (2 a^3) (1 - e^2)^(-3/2) (mpf, 1/s^2) of an orbit, the largest in a table."""
@@ -289,15 +288,13 @@ class Source:
             rest = 1 - self.of.table.largest_eccentricity**2
             size = self.strength * (self.of.table.semi_major_axis / self.of.table.smallest_axis) ** 3
             return size / (2 * rest * context.sqrt(rest))
-        assert self.of.orbit is not None
-        return self.strength * Ellipse.of(context, self.of.orbit).secular_factor
+        return self.strength * Ellipse.of(context, required(self.of.orbit)).secular_factor
 
     def normal(self, context: Any, time: Any) -> Vector:
         """Unit normal of the orbit's plane, space axes; at time zero if the node moves uniformly."""
         if self.of.table is not None:
             return self.of.table.normal(time)
-        assert self.of.orbit is not None
-        return self.of.orbit.normal(context)
+        return required(self.of.orbit).normal(context)
 
     def place(self, context: Any, time: Any) -> OrbitPlace:
         """Position on the orbit at a time, numbers (mpf)."""
@@ -307,8 +304,7 @@ class Source:
             periapsis = context.atan2(found["h"], found["k"])
             anomaly = eccentric_anomaly(context, longitude - periapsis, ellipse.eccentricity)
             return place_by_elements(context, found, anomaly, periapsis)
-        orbit = self.of.orbit
-        assert orbit is not None
+        orbit = required(self.of.orbit)
         anomaly = orbit.eccentric_anomaly(context, time)
         angles = (
             orbit.inclination,

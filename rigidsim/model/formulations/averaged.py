@@ -23,7 +23,7 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, required
 from rigidsim.model.averaged.average import DIRECTION, Average, Driven, average_of, resonance_search
 from rigidsim.model.averaged.resonance import Resonance
 from rigidsim.model.averaged.sources import Ellipse, OrbitPlace, OrbitTerms, Source
@@ -684,8 +684,7 @@ class Averaged(Formulation):
     def _resonant(self, plan: ModelPlan, number: Rounder) -> tuple[AveragedMechanics, list[StateBlock]]:
         """States of a body in spin-orbit resonance."""
         average, unit = self.average, plan.scaling.momentum
-        resonance, initial = average.resonance, average.initial(unit)
-        assert resonance is not None
+        resonance, initial = required(average.resonance), average.initial(unit)
         q = list(hy.make_vars(*SLOW[:4]))
         norm = hy.sqrt(hy.sum([x * x for x in q]))
         defect = "quaternion_norm", "norm of the slow quaternion", norm

@@ -42,7 +42,7 @@ from typing import Any, ClassVar, TypeVar
 
 import heyoka as hy
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, required
 from rigidsim.model import rotations
 from rigidsim.model.averaged.average import Average
 from rigidsim.model.carriers import carried_beside
@@ -316,8 +316,7 @@ class Rates(Formulation):
         why = plan.requirements.why
         blocks = [rate_block(m, why["rates"])]
         if plan.requirements.vertical:
-            assert m.numbers.up is not None
-            seen = apply(transpose(rotation_matrix(m.scene.quaternion)), m.numbers.up)
+            seen = apply(transpose(rotation_matrix(m.scene.quaternion)), required(m.numbers.up))
             turning = cross(m.carried(m.vertical), m.rates)  # Poisson's g' = g x w
             blocks.append(StateBlock(BODY.vertical, turning, seen, why=why["vertical"]))
         return blocks
@@ -473,9 +472,7 @@ class Canonical(Formulation):
 
     def check_start(self, scene: Scene, attitude: AttitudeStates | None) -> None:
         """Refuse a start at which canonical momenta of Euler angles don't exist."""
-        assert attitude is not None
-        context = scene.context
-        middle = attitude.initial[1]
+        context, middle = scene.context, required(attitude).initial[1]
         factor = abs(context.sin(middle) if is_proper(self.sequence) else context.cos(middle))
         if factor < context.mpf(2) ** -20:
             raise ConfigError(

@@ -47,7 +47,7 @@ from typing import Any, TypeVar
 
 import heyoka as hy
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, required
 from rigidsim.model.carriers import Carrier
 from rigidsim.model.kinematics import (
     ConstantInertia,
@@ -152,8 +152,7 @@ class MovedMass(Load, Carrier):
         """I1 + I2 - I3 and its like, and each moment, which are above zero for every body."""
         single = m.scene.config.integrator.precision == "single"
         slack, least = _SLACK_SINGLE if single else _SLACK, least_part("single" if single else "")
-        assert m.shape is not None
-        moments = [m.shape.matrix[i][i] for i in range(3)]
+        moments = [m.carried(m.shape).matrix[i][i] for i in range(3)]
         total = hy.sum(moments)
         found = []
         for axis, name in enumerate("xyz"):
@@ -169,9 +168,7 @@ class MovedMass(Load, Carrier):
 
     def supplied_power(self, m: Kinematics) -> Symbolic | None:
         """-w . I' w / 2, and what potential energies change by."""
-        assert m.shape is not None
-        assert m.shape.change is not None
-        changes = [m.shape.change[i][i] for i in range(3)]
+        changes = [m.carried(m.carried(m.shape).change)[i][i] for i in range(3)]
         terms = [-0.5 * (x * (w * w)) for x, w in zip(changes, m.rates, strict=True) if not absent(x)]
         places = hy.make_vars(*_ELEMENTS)
         apart = replace(m, shape=MassDistribution(_diagonal(list(places)), _diagonal([0.0] * 3)))
@@ -435,8 +432,7 @@ class Distortion:
 
     def _joined(self, one: Matrix | None, other: Matrix | None) -> Matrix:
         """Their sum without its trace, plus the constant part."""
-        found = self._sum([x for x in (one, other) if x is not None])
-        assert found is not None
+        found = required(self._sum([x for x in (one, other) if x is not None]))
         mean = -self.third * total([found[i][i] for i in range(3)])
         rows = []
         for i in range(3):
@@ -551,8 +547,7 @@ class Elasticity(Load, Carrier):
 
     @classmethod
     def resolve(cls, fields: Config, around: Setting) -> Elasticity:
-        table, context = fields.body.elasticity, around.context
-        assert table is not None
+        table, context = required(fields.body.elasticity), around.context
         love, radius, delay = (x.at(context) for x in (table.love_number, table.radius, table.delay))
         if around.free_flight:
             raise fault(
@@ -580,8 +575,7 @@ class Elasticity(Load, Carrier):
     @staticmethod
     def effect_parts(fields: Config) -> Iterator[EffectPart]:
         """Its delay; tides and the spin's distortion, where there are both."""
-        table = fields.body.elasticity
-        assert table is not None
+        table = required(fields.body.elasticity)
         missing = "" if table.delay.sign else "it is 0"
         yield EffectPart("delay", "delay of the distortion", {"delay": 0}, missing=missing)
         raising = _raising(fields, table.raised_by)
@@ -798,18 +792,16 @@ class Elasticity(Load, Carrier):
 
     def carried_energy(self, m: Kinematics) -> Symbolic | None:
         """(w - w0) . M / 2, and the elastic energy."""
-        assert m.shape is not None
-        assert m.rate_correction is not None
         context, scaling = m.scene.context, m.scaling
         offset = self._constants(m.scene, scaling.time, scaling.inertia)[3]
         bent = [
             total([x, hy.expression(rounded(m.number(-y)))]) if y != 0 else x
-            for rows in zip(m.carried(m.shape.distortion), offset, strict=True)
+            for rows in zip(m.carried(m.carried(m.shape).distortion), offset, strict=True)
             for x, y in zip(*rows, strict=True)
         ]
         size = context.ldexp(3 / (4 * self.strength), scaling.inertia + 2 * scaling.time)
         elastic = rounded(m.number(size)) * hy.sum([x * x for x in bent])
-        lost = [0.5 * x * y for x, y in zip(m.rate_correction, m.own_momentum, strict=True)]
+        lost = [0.5 * x * y for x, y in zip(m.carried(m.rate_correction), m.own_momentum, strict=True)]
         return hy.sum([*lost, elastic])
 
     def lends(self, m: Kinematics) -> bool:
@@ -832,9 +824,8 @@ class Elasticity(Load, Carrier):
         if not self.lends(m):
             return None
         assert isinstance(m, Mechanics)
-        assert m.rate_correction is not None
         turning = m.inertia.times(in_common_unit(m.accelerations, m.numbers.rate_units, m.number))
-        terms = [-(x * y) for x, y in zip(m.rate_correction, turning, strict=True)]
+        terms = [-(x * y) for x, y in zip(m.carried(m.rate_correction), turning, strict=True)]
         rigid = replace(m, shape=None)
         for load in m.loads:
             if not load.conservative or load is self:

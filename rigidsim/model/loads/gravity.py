@@ -45,7 +45,7 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 import heyoka as hy
 from pydantic import Field, StrictInt, StrictStr, Tag
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, required
 from rigidsim.model.earth_pole import earth_pole
 from rigidsim.model.harmonics import Harmonics, Series, TurningHarmonics, frame_of, turning
 from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
@@ -681,8 +681,7 @@ def _refuse_pole(source: str | None, around: Setting) -> None:
             "figure.pole",
             f'given "{EARTH}", the Earth\'s pole, for the source "{source}"; give its own as a vector',
         )
-    assert around.epoch is not None
-    ahead = float(around.epoch.since_j2000())
+    ahead = float(required(around.epoch).since_j2000())
     far = max(abs(float(plain(t)) + ahead) for t in (around.start, around.end)) / _CENTURY
     if far > _MOST_CENTURIES:
         raise around.fault(

@@ -40,7 +40,7 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, required
 from rigidsim.model.kinematics import Kinematics, in_common_unit
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import value_text
@@ -323,9 +323,7 @@ class FluidCore(Load):
 
     @classmethod
     def resolve(cls, fields: Config, around: Setting) -> FluidCore:
-        context, body, table = around.context, around.body, fields.body.core
-        assert table is not None
-        assert body is not None
+        context, body, table = around.context, required(around.body), required(fields.body.core)
         moment, flattening, friction = (
             x.at(context) for x in (table.moment, table.flattening, table.friction)
         )

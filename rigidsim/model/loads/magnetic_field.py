@@ -14,6 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, cast
 import heyoka as hy
 from pydantic import Field, StrictInt, Tag
 
+from rigidsim.errors import required
 from rigidsim.model.harmonics import TurningHarmonics
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Term
@@ -265,8 +266,7 @@ def field_of(fields: MagneticFieldFields, around: Setting) -> UniformField:
 
 
 def _on_orbit(fields: MagneticFieldFields, around: Setting) -> PlacedOnOrbit:
-    elements, given = fields.elements, fields.gravitational_parameter
-    assert elements is not None
+    elements, given = required(fields.elements), fields.gravitational_parameter
     for key in ("body", "table"):
         if getattr(elements, key, None) is not None:
             raise around.fault(
@@ -624,14 +624,12 @@ class EddyCurrents(InMagneticField):
 
 
 def _of_sphere(fields: EddyCurrentsFields, around: Setting) -> Any:
-    assert fields.conductivity is not None
-    assert fields.radius is not None
-    context, radius = around.context, fields.radius.at(around.context)
-    inside = context.zero
+    context = around.context
+    radius, inside = required(fields.radius).at(context), context.zero
     if fields.thickness is not None:
         inside = radius - fields.thickness.at(context)
         if inside < 0:
             raise around.fault(
                 "thickness", f"given {float(fields.thickness):g}; more than 0, up to the radius, is allowed"
             )
-    return 2 * context.pi / 15 * fields.conductivity.at(context) * (radius**5 - inside**5)
+    return 2 * context.pi / 15 * required(fields.conductivity).at(context) * (radius**5 - inside**5)

@@ -356,8 +356,7 @@ def _angle_between(a: list[Symbolic], b: list[Symbolic]) -> Symbolic:
 
 
 def _wobble_angle(m: Mechanics) -> list[Symbolic]:
-    largest = unique_axis(m.scene.body, m.scene.context, largest=True)
-    assert largest is not None
+    largest = m.carried(unique_axis(m.scene.body, m.scene.context, largest=True))
     return [_angle_between(m.fixed(largest), m.momentum_body)]
 
 
@@ -457,8 +456,7 @@ def _bounded(x: Symbolic) -> Symbolic:
 
 
 def _insolation(m: Mechanics) -> list[Symbolic]:
-    table, context = m.scene.config.output.insolation, m.scene.context
-    assert table is not None  # else the variable isn't found
+    table, context = m.carried(m.scene.config.output.insolation), m.scene.context
     (c, s), (k, h) = _equinox(m), _eccentric(m)
     sine = hy.sqrt(c * c + s * s)  # of the obliquity
     solar, latitude = table.solar_longitude.at(context), table.latitude.at(context)

@@ -147,8 +147,7 @@ def energy_scale(m: Mechanics, *, kept: bool = False) -> tuple[Any, str]:
 
 def linear_momentum_scale(m: Mechanics) -> tuple[Any, str]:
     """M abs(v) at the start."""
-    assert m.scene.velocity is not None
-    value = m.scene.body.mass * norm(m.scene.context, m.scene.velocity)
+    value = m.scene.body.mass * norm(m.scene.context, m.carried(m.scene.velocity))
     return (value, "initial norm of the linear momentum") if value else (m.scene.context.one, "1 kg m/s")
 
 
@@ -160,12 +159,11 @@ def attracting_point(m: Mechanics) -> Vector:
 def total_momentum_scale(m: Mechanics) -> tuple[Any, str]:
     """abs of the orbital plus the spin angular momentum at the start."""
     scene, context = m.scene, m.scene.context
-    assert scene.position is not None
-    assert scene.velocity is not None
-    offset = [x - a for x, a in zip(scene.position, attracting_point(m), strict=True)]
-    orbital = scene.body.mass * norm(context, cross(offset, scene.velocity))
+    velocity = m.carried(scene.velocity)
+    offset = [x - a for x, a in zip(m.carried(scene.position), attracting_point(m), strict=True)]
+    orbital = scene.body.mass * norm(context, cross(offset, velocity))
     spin, _ = momentum_scale(m)
-    rounded = scene.body.mass * norm(context, attracting_point(m)) * norm(context, scene.velocity)
+    rounded = scene.body.mass * norm(context, attracting_point(m)) * norm(context, velocity)
     if rounded > orbital + spin:
         return rounded, "linear momentum times the attracting point's distance from the origin"
     return orbital + spin, "initial orbital plus spin angular momentum"
@@ -273,10 +271,8 @@ def _work_exponent(m: Mechanics) -> int:
 
 def linear_momentum(m: Mechanics) -> list[Symbolic]:
     """Linear momentum M v, in units of speed times 2^``mass_exponent``."""
-    assert m.velocity is not None
-    context = m.scene.context
-    mass = context.ldexp(m.scene.body.mass, -mass_exponent(m))
-    return [m.number(mass) * v for v in m.velocity]
+    mass = m.scaled(m.scene.body.mass, -mass_exponent(m))
+    return [mass * v for v in m.carried(m.velocity)]
 
 
 def mass_exponent(m: Mechanics) -> int:
