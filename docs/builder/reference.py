@@ -299,7 +299,7 @@ def python_page() -> str:
         + "\n\n".join(
             [
                 _directive("autoclass", "rigidsim.model.load.Load", members=True),
-                _directive("autoclass", "rigidsim.model.carriers.Carrier", members=True),
+                _directive("autoclass", "rigidsim.model.mechanics.Carrier", members=True),
                 _directive("autoclass", "rigidsim.model.observables.observable.Observable"),
                 _directive("autofunction", "rigidsim.model.observables.observable.continuous_angles"),
                 _directive("autoclass", "rigidsim.solve.effects.effect.Effect", members=True),

@@ -296,6 +296,13 @@ class Kinematics:
         return ConstantInertia.of(self.numbers, self.number, self.scene.context)
 
     @cached_property
+    def mass_tensor(self) -> SymbolicMatrix:
+        """Tensor of the mass distribution, whose elements that are zero for good are the number 0."""
+        if self.shape is not None:
+            return self.shape.matrix
+        return [[self.number(x) if x != 0 else 0.0 for x in row] for row in self.numbers.inertia]
+
+    @cached_property
     def own_momentum(self) -> list[Symbolic]:
         """Angular momentum I w of the body itself, body axes."""
         return self.inertia.times(self.undistorted_rates)
@@ -429,20 +436,11 @@ def seconds(m: Kinematics, since: Epoch | None = None) -> Symbolic:
 def quadratic_form(m: Kinematics, direction: list[Symbolic]) -> Symbolic:
     """c . I c for a direction c in body axes, internal units of inertia."""
     rows = []
-    if m.shape is not None:
-        for given, c in zip(m.shape.matrix, direction, strict=True):
-            rows += [x * (c * d) for x, d in zip(given, direction, strict=True) if not absent(x)]
-        return hy.sum(rows)
-    for row, c in zip(m.numbers.inertia, direction, strict=True):
-        rows += [m.number(x) * (c * d) for x, d in zip(row, direction, strict=True) if x != 0]
+    for row, c in zip(m.mass_tensor, direction, strict=True):
+        rows += [x * (c * d) for x, d in zip(row, direction, strict=True) if not absent(x)]
     return hy.sum(rows)
 
 
 def inertia_times(m: Kinematics, direction: list[Symbolic]) -> list[Symbolic]:
     """I c for a direction c in body axes, internal units of inertia."""
-    if m.shape is not None:
-        return product(m.shape.matrix, direction)
-    inertia = m.numbers.inertia
-    return [
-        hy.sum([m.number(x) * d for x, d in zip(row, direction, strict=True) if x != 0]) for row in inertia
-    ]
+    return product(m.mass_tensor, direction)

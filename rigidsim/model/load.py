@@ -42,7 +42,7 @@ class Load(SceneLoad):
     A load of a user takes the state in SI (``rigidsim.model.si.InSI``) and gives SI: torques in N m,
     potentials in J, powers in W. rigidsim's own loads are written in internal units.
 
-    A load that carries angular momentum is a ``rigidsim.model.carriers.Carrier``.
+    A load that carries angular momentum is a ``rigidsim.model.mechanics.Carrier``.
 
     Attributes:
         title: name used in reasons and messages.

@@ -20,11 +20,10 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.carriers import Carrier
 from rigidsim.model.formulations.formulation import ModelPlan, Requirements, quaternion_states
 from rigidsim.model.kinematics import in_common_unit
 from rigidsim.model.load import Load, Term, force_terms, loads_of, torque_terms
-from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.mechanics import Carrier, Mechanics
 from rigidsim.model.names import written
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import EstimatedEffect, choose_scaling, scaled_numbers

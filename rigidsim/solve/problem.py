@@ -12,8 +12,8 @@ import mpmath
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem, Remedy
-from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import Load, own_loads
+from rigidsim.model.mechanics import carried_beside
 from rigidsim.model.model_plan import plan_model
 from rigidsim.model.scaling import gyroscopic_rate
 from rigidsim.model.system import System, build_system, conserves, projected_invariants

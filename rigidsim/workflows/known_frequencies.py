@@ -11,10 +11,10 @@ from typing import Any
 import mpmath
 
 from rigidsim.analysis.labels import Known
-from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import loads_of
 from rigidsim.model.loads.changing_tensor import Elasticity
 from rigidsim.model.loads.inner_bodies import FluidCore, core_of
+from rigidsim.model.mechanics import carried_beside
 from rigidsim.model.sources import in_body_axes
 from rigidsim.scene.arithmetic import Vector, dot, norm
 from rigidsim.scene.scene import Scene

@@ -59,9 +59,8 @@ from rigidsim.model.averaged.free_motion import (
 )
 from rigidsim.model.averaged.resonance import Resonance, SlowStart
 from rigidsim.model.averaged.sources import Source, nutation, sources_of, unit
-from rigidsim.model.carriers import Carrier, carried_beside
 from rigidsim.model.load import Load
-from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.mechanics import Carrier, Mechanics, carried_beside
 from rigidsim.model.orbits import Carried
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling, scaled_numbers

@@ -43,6 +43,7 @@ from rigidsim.errors import required
 from rigidsim.model.load import Load
 from rigidsim.model.loads.gravity import Attraction
 from rigidsim.model.orbits import ElementStates
+from rigidsim.model.placements import Circuit
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.two_part import as_factor, rounded
@@ -222,26 +223,20 @@ class OrbitTerms:
         return nutation(hy, self.ellipse, place, size, s, (lambda x: x) if given else self.number)
 
 
-@dataclass(frozen=True)
-class Source:
+@dataclass(frozen=True, kw_only=True)
+class Source(Circuit):
     """The source of one gravity gradient; a point mass is judged by its osculating orbit of the start."""
 
     number: int  # position of its ``[[loads]]`` table, from 1
     of: Attraction
     strength: Any  # 3 G M / a^3 (mpf, 1/s^2), a being ``Placement.distance``
-    # as in ``Circuit``:
-    motion: float = 0.0
-    eccentricity: float = 0.0
-    nearest: float = 1.0
-    slow_rate: float = 0.0
-    uncertainty: float = 0.0
-    passing_rate: float | None = None
 
     @classmethod
     def at_start(cls, context: Any, number: int, source: Attraction) -> Self:
         """The source as it moves at the start."""
         size = 3 * source.gravitational_parameter / source.placement.distance(context) ** 3
-        return cls(number, source, size, **vars(source.placement.circuit(context)))
+        circuit = vars(source.placement.circuit(context))
+        return cls(number=number, of=source, strength=size, **circuit)
 
     @property
     def name(self) -> str:

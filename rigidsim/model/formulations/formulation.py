@@ -45,10 +45,9 @@ import heyoka as hy
 from rigidsim.errors import ConfigError, Problem, required
 from rigidsim.model import rotations
 from rigidsim.model.averaged.average import Average
-from rigidsim.model.carriers import carried_beside
 from rigidsim.model.kinematics import ConstantInertia, in_common_unit
 from rigidsim.model.load import Load
-from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.mechanics import Mechanics, carried_beside
 from rigidsim.model.orbits import Carried, TablePlace
 from rigidsim.model.probing import turned_out
 from rigidsim.model.rotations import Symbolic

@@ -48,7 +48,6 @@ from typing import Any, TypeVar
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem, required
-from rigidsim.model.carriers import Carrier
 from rigidsim.model.kinematics import (
     ConstantInertia,
     Kinematics,
@@ -60,7 +59,7 @@ from rigidsim.model.kinematics import (
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.load_words import span_words
 from rigidsim.model.loads.gravity import Attraction
-from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.mechanics import Carrier, Mechanics
 from rigidsim.model.names import written
 from rigidsim.model.own_states import driven, own_blocks
 from rigidsim.model.rotations import Symbolic, transpose
@@ -87,8 +86,8 @@ _CLOCK = "t_of_moments"
 _ELEMENTS = ("moment_x", "moment_y", "moment_z")
 _SLACK, _SLACK_SINGLE = 2.0**-40, 2.0**-16
 """Part of their sum by which the moments of a flat body may break I1 + I2 >= I3, beside rounding."""
-_TIMES = 512  # of a run's span, at which functions of time alone are looked at
-_DRIVEN_TIMES, _PARTS = 16, (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0625, -0.0625)
+_TIMES = 512  # of a run's span, at which moments are looked at
+_DRIVEN_EACH, _PARTS = 32, (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0625, -0.0625)
 _MOST = 1e9  # ratio of moments past which no size is estimated
 _LITTLE = 1e-6
 
@@ -189,36 +188,23 @@ class MovedMass(Load, Carrier):
         context = scene.context
         energies = zip(scene.body.principal_moments, scene.angular_velocity, strict=True)
         energy = sum((moment * rate**2 / 2 for moment, rate in energies), context.zero)
-        largest = max(self._by_time(scene), self._by_states(scene), 1.0)
+        largest = self._fall(scene)
         return energy * (2 ** math.frexp(largest)[1]) if largest > 1 + _LITTLE else context.zero
 
-    def _by_time(self, scene: Scene) -> float:
-        """Largest ratio by which a moment that depends on time alone falls."""
-        found = 1.0
-        for axis, expression in self.formulae:
-            begun = float(plain(scene.body.principal_moments[axis]))
-            for n in range(_TIMES + 1) if names_used(expression) == {"t"} else ():
-                then = scene.start + (scene.end - scene.start) * n / _TIMES
-                try:
-                    moment = float(plain(evaluate(expression, {"t": then}, scene.context)))
-                except ExpressionError:
-                    continue
-                found = max(found, begun / moment) if moment > begun / _MOST else found
-        return found
-
-    def _by_states(self, scene: Scene) -> float:
-        """Largest ratio by which a moment falls while user-defined states go to where they are driven at some
-        times of the run, all together, part of the way or as far to the other side; 1 if none reads them.
+    def _fall(self, scene: Scene) -> float:
+        """Largest ratio by which a moment falls at times of the run; at some of them user-defined states go
+        to where they are driven then, all together, part of the way or as far to the other side.
         """
-        if not self.reads:
-            return 1.0
         context, span, values = scene.context, scene.end - scene.start, start_values(scene)
         begun = [float(plain(x)) for x in scene.body.principal_moments]
         sizes, found = {x.name: abs(x.initial) for x in scene.states}, 1.0
-        for n in range(_DRIVEN_TIMES + 1):
-            values["t"] = scene.start + span * n / _DRIVEN_TIMES
-            ends = {x.name: driven(scene, x.name, values, sizes, span) for x in scene.states}
-            for part in _PARTS:
+        for n in range(_TIMES + 1):
+            values["t"], driving = scene.start + span * n / _TIMES, bool(self.reads) and n % _DRIVEN_EACH == 0
+            ends = {
+                x.name: driven(scene, x.name, values, sizes, span) if driving else x.initial
+                for x in scene.states
+            }
+            for part in _PARTS if driving else (1.0,):
                 there = {x.name: x.initial + part * (ends[x.name] - x.initial) for x in scene.states}
                 there["t"] = values["t"]
                 try:
@@ -228,7 +214,7 @@ class MovedMass(Load, Carrier):
                     ]
                 except ExpressionError:
                     continue
-                if min(moments) > 0 and sum(moments) >= 2 * max(moments):
+                if min(moments) > 0 and sum(moments) * (1 + _LITTLE) >= 2 * max(moments):  # of a body
                     found = max(found, *(min(a / b, _MOST) for a, b in zip(begun, moments, strict=True)))
         return found
 

@@ -63,9 +63,7 @@ from rigidsim.model.observables.observable import (
 from rigidsim.model.rotations import Symbolic, along, apply, length, unit
 from rigidsim.model.scaling import source_rate
 from rigidsim.scene import attitude
-from rigidsim.scene.arithmetic import apply as apply_numbers
 from rigidsim.scene.arithmetic import apply as multiply
-from rigidsim.scene.arithmetic import apply as turned
 from rigidsim.scene.arithmetic import cross, dot, norm
 from rigidsim.scene.frame import unique_axis
 from rigidsim.scene.space_axes import ECLIPTIC, obliquity, to_equator
@@ -245,7 +243,7 @@ def _senses(m: Mechanics) -> tuple[int, int]:
     """Side of the reference plane, and of the figure's equator, on which the momentum starts: +1 or -1."""
     scene = m.scene
     momentum = m.starting_momentum
-    in_space = apply_numbers(attitude.rotation_matrix(scene.quaternion), momentum)
+    in_space = multiply(attitude.rotation_matrix(scene.quaternion), momentum)
     above = dot(in_space, initial_normal(scene, m.loads))
     return (-1 if above < 0 else 1), (-1 if dot(momentum, scene.figure.pole) < 0 else 1)
 
@@ -430,7 +428,7 @@ def _precession(m: Mechanics) -> list[Angle]:
     """From the equinox of the start, whose cosine and sine are numbers."""
     scene, (c, s) = m.scene, _equinox(m)
     axes = initial_plane(scene, m.carried(_source(m)))
-    pole = turned(attitude.rotation_matrix(scene.quaternion), scene.figure.pole)
+    pole = multiply(attitude.rotation_matrix(scene.quaternion), scene.figure.pole)
     u, v = (dot(axis, pole) for axis in axes[:2])
     size = scene.context.hypot(u, v)
     if size == 0:  # no equinox
