@@ -7,8 +7,16 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 _MOST_SHOWN = 30
+_T = TypeVar("_T")
+
+
+def required(part: _T | None) -> _T:
+    """The part itself, which the caller knows to be there: without it the code is wrong, not the input."""
+    assert part is not None
+    return part
 
 
 class Wording:

@@ -184,7 +184,7 @@ class Crossing:
 class System:
     """First-order equations with scaled states, and everything recorded as expressions of them.
 
-    Each part is worked out once, when it is first needed. In a run that goes backwards internal time is the
+    In a run that goes backwards internal time is the
     scene's with the other sign: of equations written in the scene's time t every right-hand side changes its
     sign, and t is minus the engine's time in all expressions.
 
@@ -194,6 +194,13 @@ class System:
         formulation: of the rotation: the plan's, or its partner (``chart``).
         sequence: sequence of the Euler angles that are states, or that are recorded.
         clocked: whether the second number of the time is the last parameter.
+        coefficients: rounds the coefficients of the equations, if not as everything else.
+        mechanics: what outputs and invariants are written in.
+        blocks: the states, block by block.
+        states, variables: names of the states, and the states as heyoka variables.
+        state_exponents: binary, that bring the states to SI.
+        initial: initial values (mpf), internal units.
+        start: of the motion in internal time (mpf).
     """
 
     def __init__(
@@ -210,7 +217,13 @@ class System:
         self.sequence = self.formulation.sequence or plan.scene.config.integrator.euler_sequence
         self.scene, self.scaling, self.requirements = plan.scene, plan.scaling, plan.requirements
         self.wide, self.clocked = plan.wide, plan.clocked
-        self._chart, self._coefficients, self._initial = chart, coefficients, initial
+        self._chart, self.coefficients, self._initial = chart, coefficients, initial
+        self.mechanics, self.blocks = assemble_states(plan, self.formulation, number)
+        self._joined = whole = joined(self.blocks)
+        self.states, self.variables = list(whole.names), whole.variables
+        self.state_exponents = whole.unit_exponents
+        self.initial = list(whole.initial if initial is None else initial)
+        self.start = self.scaling.internal(self.scene.start, self.scene.context)
 
     # --- the same motion, rounded otherwise -----------------------------------------------------------------
 
@@ -221,21 +234,16 @@ class System:
     def with_coefficients(self, coefficients: Rounder) -> System:
         """The same system with the coefficients of its equations rounded otherwise, as in two parts."""
         other = copy.copy(self)  # keeps everything already worked out except what the coefficients change
-        other._coefficients = coefficients
+        other.coefficients = coefficients
         other.__dict__.pop("equations", None)
         if other.__dict__.get("partner") is not None:
             other.__dict__["partner"] = other.__dict__["partner"].with_coefficients(coefficients)
         return other
 
     @property
-    def coefficients(self) -> Rounder | None:
-        """What rounds the coefficients of the equations, if not as everything else."""
-        return self._coefficients
-
-    @property
     def in_two_parts(self) -> bool:
         """Whether coefficients of the equations have digits that the working precision can't hold."""
-        return self._coefficients is not None
+        return self.coefficients is not None
 
     @cached_property
     def partner(self) -> System | None:
@@ -247,7 +255,7 @@ class System:
         partner = self.formulation.partner
         if partner is None:
             return None
-        return System(self.plan, self.number, chart=partner, coefficients=self._coefficients)
+        return System(self.plan, self.number, chart=partner, coefficients=self.coefficients)
 
     @cached_property
     def rate_bound(self) -> Any:
@@ -257,48 +265,10 @@ class System:
     # --- states ---------------------------------------------------------------------------------------------
 
     @cached_property
-    def _assembled(self) -> tuple[Mechanics, list[StateBlock]]:
-        return assemble_states(self.plan, self.formulation, self.number)
-
-    @property
-    def mechanics(self) -> Mechanics:
-        """What outputs and invariants are written in."""
-        return self._assembled[0]
-
-    @property
-    def blocks(self) -> list[StateBlock]:
-        """The states, block by block."""
-        return self._assembled[1]
-
-    @cached_property
-    def _joined(self) -> StateBlock:
-        return joined(self.blocks)
-
-    @property
-    def states(self) -> list[str]:
-        """Names of the states."""
-        return list(self._joined.names)
-
-    @property
-    def initial(self) -> list[Any]:
-        """Initial values (mpf), internal units."""
-        return list(self._joined.initial if self._initial is None else self._initial)
-
-    @property
-    def state_exponents(self) -> list[int]:
-        """Binary exponents that bring the states to SI."""
-        return self._joined.unit_exponents
-
-    @property
-    def variables(self) -> list[Symbolic]:
-        """The states as heyoka variables."""
-        return self._joined.variables
-
-    @cached_property
     def equations(self) -> list[tuple[Symbolic, Symbolic]]:
         """(variable, right-hand side)."""
-        if self._coefficients is not None:
-            return System(self.plan, self._coefficients, chart=self._chart).equations
+        if self.coefficients is not None:
+            return System(self.plan, self.coefficients, chart=self._chart).equations
         rates = self._joined.derivatives
         if self.scaling.direction < 0:
             rates = [-rate for rate in self._in_internal_time(rates)]
@@ -313,11 +283,6 @@ class System:
             second = hy.par[self.plan.surfaces.parameters]
             other[second] = -second
         return list(hy.subs([hy.expression(x) for x in expressions], other))
-
-    @property
-    def start(self) -> Any:
-        """Start of the motion in internal time (mpf)."""
-        return self.scaling.internal(self.scene.start, self.scene.context)
 
     @property
     def reasons(self) -> list[tuple[str, str]]:
