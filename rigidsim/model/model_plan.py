@@ -32,7 +32,7 @@ from rigidsim.model.own_states import own_units, refuse_odd_states
 from rigidsim.model.placements import refuse_same_sources
 from rigidsim.model.scaling import Scaling, choose_scaling, scaled_numbers
 from rigidsim.scene.choices import AUTO, variables_named
-from rigidsim.scene.expressions.tree import readables, states_read
+from rigidsim.scene.expressions.tree import states_read
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import surfaces_of
@@ -122,7 +122,8 @@ def _choose_requirements(scene: Scene, loads: Sequence[Load]) -> Requirements:
     _check_recordable(scene, asked, record)
     refuse_without_plane(scene, loads)
     readers = {
-        need: _each_once([load for load in loads if need in load.reads]) for need in ("attitude", "flight")
+        need: list(dict.fromkeys(load.title for load in loads if need in load.reads))
+        for need in ("attitude", "flight")
     }
     others = [(f"event {event.name}", states_read(event.expression)) for event in scene.events]
     others += [(f"state {state.name}", states_read(state.derivative)) for state in scene.states]
@@ -155,11 +156,10 @@ def _choose_requirements(scene: Scene, loads: Sequence[Load]) -> Requirements:
         why["attitude"] = reason + ("; gravity's torque reads it" if torque else "")
         if readers["attitude"] and reason != _read_by(readers["attitude"]):
             why["attitude"] += f"; {_read_by(readers['attitude'])}"
-        why["attitude"] += _names_that_take(scene, "attitude")
     if not scene.free_flight:
         left_out.append(("position and velocity", "[initial] has neither"))
     elif (reason := _flight(scene, record, readers["flight"])) is not None:
-        why["flight"] = reason + _names_that_take(scene, "flight")
+        why["flight"] = reason
     else:
         left_out.append(("position and velocity", "neither recorded nor read by a load"))
     carried = [state.name for state in scene.states]
@@ -181,33 +181,8 @@ def _attitude(scene: Scene, asked: str, record: list[str] | None, readers: list[
     return f"{', '.join(recorded)} is recorded" if recorded else None
 
 
-def _each_once(loads: Sequence[Load]) -> list[str]:
-    """The kinds of loads, with how many of a kind there are, or of which bodies of a kernel."""
-    kinds: dict[str, list[Load]] = {}
-    for load in loads:
-        kinds.setdefault(load.title, []).append(load)
-    titles = []
-    for title, alike in kinds.items():
-        # no numbers as in pictures: numbers that are read distinguish members of a sweep
-        sources = [name for load in alike if (name := load.placement.name)]
-        of_which = ", ".join(sources) if len(sources) == len(alike) else f"{len(alike)} loads"
-        titles.append(f"{title} ({of_which})" if len(alike) > 1 else title)
-    return titles
-
-
 def _read_by(readers: list[str], them: str = "it") -> str:
     return f"{', '.join(readers)} read{'s' if len(readers) == 1 else ''} {them}"
-
-
-def _names_that_take(scene: Scene, need: str) -> str:
-    """The names in expressions that stand for what takes these states, and where they are read."""
-    found: dict[str, set[str]] = {}
-    for expression in scene.formulas():
-        names = {readable.name for readable in readables(expression) if need in readable.states}
-        if names:
-            found.setdefault(expression.where.rsplit(" ", 1)[0], set()).update(names)
-    places = [f"{', '.join(sorted(names))} in {place}" for place, names in found.items()]
-    return f" ({'; '.join(places)})" if places else ""
 
 
 def _flight(scene: Scene, record: list[str] | None, readers: list[str]) -> str | None:

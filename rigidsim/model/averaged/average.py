@@ -55,7 +55,6 @@ from rigidsim.model.averaged.free_motion import (
     free_motion,
     mean_square_sine,
     means_needed,
-    nodes_needed,
 )
 from rigidsim.model.averaged.resonance import Resonance, SlowStart
 from rigidsim.model.averaged.sources import Source, nutation, sources_of, unit
@@ -190,20 +189,6 @@ def kept_resonance(
     return kept[0] if kept else None
 
 
-def resonance_search(sources: Sequence[Source]) -> str:
-    """How resonances with point masses were looked for; empty without point masses."""
-    masses = [(source.of.placement.name, source.motion > 0) for source in sources if source.of.reacts]
-    bound, passing = ([name for name, holds in masses if holds is held] for held in (True, False))
-    searches = []
-    if bound:
-        searches.append(f"with the osculating orbits of the start for {', '.join(bound)}")
-    if passing:
-        searches.append(
-            f"not for {', '.join(passing)}, not bound to the body and slower than all of its rates"
-        )
-    return f"; resonances were looked for {', '.join(searches)}" if searches else ""
-
-
 def _refuse_resonance(
     scene: Scene,
     wobble: Wobble,
@@ -317,7 +302,7 @@ _SEPARATRIX = (
 )
 RATE_STATES = BODY.rates
 _CLOCK = "t_of_torque"
-_MOST_NODES = 1024
+_FEWEST_NODES, _MOST_NODES = 8, 1024
 _CHECKED = 1e-12
 """Relative difference between sums over n and over 2 n nodes, in double precision, at which n are taken to
 resolve a torque whose smoothness isn't known.
@@ -409,26 +394,23 @@ class DrivingTorques:
     def nodes(self, amplitudes: np.ndarray, epsilon: float) -> int:
         """Nodes for sums over f that err by less than epsilon for all these amplitudes.
 
-        At least those that the weight needs (``nodes_needed``); doubled until sums over twice as many agree
-        in double precision, which measures the smoothness of the torque itself, and in proportion to the
-        digits beyond.
+        More and more until sums over twice as many agree in double precision, which measures how smooth
+        torque and weight are, and in proportion to the digits beyond.
 
         Raises:
             ArithmeticError: a torque that too many nodes don't resolve.
         """
         if not self.others:
             return 0
-        largest = max(map(self.parameter_at, amplitudes))
-        count = nodes_needed(largest, max(epsilon, 2.0**-_BITS_CHECKED)) + 8
+        count, around = _FEWEST_NODES, 2 * np.pi * np.arange(_NODES) / _NODES
         # of what is averaged: a mean may vanish
-        around = 2 * np.pi * (np.arange(count) + 0.5) / count
         scale = max(float(np.abs(self.change(p, q, around)).max()) for p, q in amplitudes)
         while count <= _MOST_NODES:
             pairs = [(self.mean(p, q, count), self.mean(p, q, 2 * count)) for p, q in amplitudes]
             if all(float(np.abs(x - y).max()) <= _CHECKED * scale for x, y in pairs):
                 more = -np.log2(epsilon) / _BITS_CHECKED
                 return int(np.ceil(count * max(1.0, more)))
-            count *= 2
+            count += count // 4
         raise ArithmeticError
 
     def wobble(self, axial: float, transverse: float, amplitude: float = 0.0) -> Wobble:

@@ -148,7 +148,6 @@ def _ordered(context: Any, body: RigidBody, momentum: Vector, length: Any) -> tu
 
 
 _MEANS = 40  # arithmetic-geometric means; each squares what is left
-_STRIPS = 64  # of complex amplitudes, over which the bound of a sum's error is made small
 
 
 @dataclass(frozen=True)
@@ -220,24 +219,6 @@ def means_needed(parameter: float, epsilon: float) -> int:
         if power * square < epsilon * parameter / 4:
             return count
     return _MEANS
-
-
-def nodes_needed(parameter: float, epsilon: float) -> int:
-    """Nodes over a turn of f for which sums with the weight 1 / dn err by less than epsilon.
-
-    The trapezoidal sum over n nodes of a function that is analytic and at most M for abs(Im f) < b errs by
-    2 M / (e^(n b) - 1) (Trefethen & Weideman 2014, SIAM Review 56, theorem 3.2). Here cosh b < 1 / k, and
-    M = (1 - k^2 cosh^2 b)^(-1/2); a torque that isn't smooth needs more (``DrivingTorques.nodes``).
-    """
-    if parameter <= 0:
-        return 1
-    widest = math.acosh(1 / math.sqrt(parameter))
-    fewest = math.inf
-    for strip in range(1, _STRIPS):
-        width = min(widest, 40.0) * strip / _STRIPS
-        largest = (1 - parameter * math.cosh(width) ** 2) ** -0.5
-        fewest = min(fewest, math.log1p(2 * largest / epsilon) / width)
-    return math.ceil(fewest)
 
 
 _POINTS = 256

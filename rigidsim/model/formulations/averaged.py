@@ -24,7 +24,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem, required
-from rigidsim.model.averaged.average import DIRECTION, Average, Driven, average_of, resonance_search
+from rigidsim.model.averaged.average import DIRECTION, Average, Driven, average_of
 from rigidsim.model.averaged.resonance import Resonance
 from rigidsim.model.averaged.sources import Ellipse, OrbitPlace, OrbitTerms, Source
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Requirements
@@ -711,7 +711,6 @@ class Averaged(Formulation):
         why = _WHY[average.level]
         if average.driven is not None:
             why = _WHY_TURNED if average.sources else _WHY_AT_REST
-        why += resonance_search(average.sources)
         blocks = [StateBlock(DIRECTION, m.derivatives, average.start, why=why)]
         if isinstance(m, DrivenMechanics):
             blocks.append(_amplitudes(m))
