@@ -1,7 +1,6 @@
 """Triangle meshes of the solids that bodies are made of, coloured so that a rotation shows.
 
-Every mesh is a list of separate triangles (no shared vertices), so that neighbouring patches keep
-sharp colours; normals point outwards and are smooth where the solid is.
+Every mesh is a list of separate triangles, so that neighbouring patches keep sharp colours.
 
 Maps have the north pole above and count longitudes eastwards from the body's x axis, which the preset Earth,
 whose equatorial moments are equal, leaves open. ``data/earth.png`` has the coasts of Natural Earth 4.1.0,
@@ -44,31 +43,33 @@ _SHARP = np.cos(np.deg2rad(25.0))  # between the normals of two faces: what coun
 
 @dataclass(frozen=True)
 class Mesh:
-    """A closed triangle mesh."""
+    """A closed triangle mesh: corners and outward unit normals of the smooth surface (T, 3, 3), metres, the
+    corners anticlockwise as seen from outside, and a colour (T, 3) of each triangle, or instead a picture
+    (height, width, 3) with the corners' places in it (T, 3, 2), across and down, of its sizes.
+    """
 
-    vertices: Array  # (3 T, 3), metres, three per triangle and shared with none
-    triangles: NDArray[np.uint32]  # (T, 3) indices of vertices, anticlockwise as seen from outside
-    normals: Array  # (3 T, 3), outward unit normals of the smooth surface
-    colors: NDArray[np.uint8]  # (3 T, 3) red green blue, constant over a triangle
-    picture: NDArray[np.uint8] | None = None  # (height, width, 3), texture in place of its colours
-    places: Array | None = None  # (3 T, 2) in the picture, across and down, of its sizes
+    corners: Array
+    normals: Array
+    colors: NDArray[np.uint8]
+    places: Array
+    picture: NDArray[np.uint8] | None = None
+
+    @property
+    def vertices(self) -> Array:
+        """All corners (3 T, 3)."""
+        return self.corners.reshape(-1, 3)
 
     def moved(self, rotation: Array, shift: Array) -> Self:
         """The mesh rotated by `rotation` (3, 3), then moved by `shift` (3,), metres."""
-        return replace(self, vertices=self.vertices @ rotation.T + shift, normals=self.normals @ rotation.T)
+        return replace(self, corners=self.corners @ rotation.T + shift, normals=self.normals @ rotation.T)
 
     def scaled(self, factor: float) -> Self:
         """The mesh with all lengths multiplied by `factor` > 0."""
-        return replace(self, vertices=self.vertices * factor)
-
-    def volume(self) -> float:
-        """Enclosed volume in m^3 (divergence theorem), positive when normals point outwards."""
-        a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
-        return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+        return replace(self, corners=self.corners * factor)
 
     def reach(self) -> float:
         """Largest distance of a vertex from the origin, metres."""
-        return float(np.sqrt((self.vertices**2).sum(axis=1).max()))
+        return float(np.sqrt((self.corners**2).sum(axis=2).max()))
 
 
 def solid_mesh(solid: str, dimensions: Mapping[str, Any]) -> Mesh:
@@ -123,11 +124,8 @@ def _solid(entry: Mapping[str, Any]) -> Mesh:
 
 def _two_sided(plate: Mesh, back: Color) -> Mesh:
     """A plate with its front (+z) in one colour, its back in another, and pale edges."""
-    colors = plate.colors.copy()
-    colors[:] = _LIGHT
-    colors[plate.normals[:, 2] > 0.5] = _UPPER
-    colors[plate.normals[:, 2] < -0.5] = back
-    return replace(plate, colors=colors)
+    up = plate.normals[:, 0, 2:]
+    return replace(plate, colors=_painted(np.select([up > 0.5, up < -0.5], [_UPPER, back], _LIGHT)))
 
 
 def point_positions(drawing: Sequence[Mapping[str, Any]]) -> Array:
@@ -149,34 +147,21 @@ def _placement(entry: Mapping[str, Any]) -> tuple[Array, Array]:
     return rotation_matrix(turn if turn is not None else (1.0, 0.0, 0.0, 0.0)), shift
 
 
-def _soup(corners: Array, normals: Array, colors: NDArray[np.uint8]) -> Mesh:
-    """Separate triangles from corners and normals (T, 3, 3) and one colour each (T, 3)."""
-    # Triangles that shrink to a line where a profile meets the axis carry no area.
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    keep = area > 1e-12 * area.max()
-    count = int(keep.sum())
-    return Mesh(
-        corners[keep].reshape(-1, 3),
-        np.arange(3 * count, dtype=np.uint32).reshape(-1, 3),
-        normals[keep].reshape(-1, 3),
-        np.repeat(colors[keep], 3, axis=0),
-    )
+def _painted(colors: Any) -> NDArray[np.uint8]:
+    """Colours (T, 3) as the viewer takes them."""
+    return np.clip(colors, 0, 255).astype(np.uint8)
 
 
 def _box(a: float, b: float, c: float) -> Mesh:
     corners, normals, colors = [], [], []
-    half = np.array([a, b, c]) / 2
-    for axis, sign in product(range(3), (1, -1)):
-        across = [(axis + 1) % 3, (axis + 2) % 3]
-        quad = np.zeros((4, 3))
-        quad[:, axis] = sign * half[axis]
-        quad[:, across] = half[across] * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
-        shade = np.array(_AXIS_COLORS[axis]) * (1.0 if sign > 0 else _DARKER)
-        for pick in ((0, 1, 2), (0, 2, 3)):
-            corners.append(quad[::sign][list(pick)])
-            normals.append(np.tile(sign * np.eye(3)[axis], (3, 1)))
-            colors.append(shade.astype(np.uint8))
-    return _soup(np.array(corners), np.array(normals), np.array(colors))
+    half, axes = np.array([a, b, c]) / 2, np.eye(3)
+    for k, sign in product(range(3), (1, -1)):
+        first, second = axes[(k + 1) % 3], axes[(k + 2) % 3]
+        quad = half * (sign * axes[k] + np.outer([-1, 1, 1, -1], first) + np.outer([-1, -1, 1, 1], second))
+        corners += [quad[::sign][[0, 1, 2]], quad[::sign][[0, 2, 3]]]
+        normals += 2 * [np.tile(sign * axes[k], (3, 1))]
+        colors += 2 * [np.array(_AXIS_COLORS[k]) * (1.0 if sign > 0 else _DARKER)]
+    return Mesh(np.array(corners), np.array(normals), _painted(colors), np.zeros((12, 3, 2)))
 
 
 def revolved(pieces: Sequence[StraightPiece | Arc], *, middle: float = 0.0) -> Mesh:
@@ -193,28 +178,27 @@ def _revolve(profile: Array, normals: Array, segments: int = SEGMENTS, *, middle
     """
     angle = np.linspace(0.0, 2 * np.pi, segments + 1)
     angle[-1] = 0.0  # the seam closes exactly
-    turn = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    turn = np.stack([np.cos(angle), np.sin(angle), np.ones(segments + 1)], axis=1)
 
-    def swept(pair: Array) -> Array:  # (P, 2) to (P, segments + 1, 3)
-        flat = pair[:, None, 0, None] * turn[None]
-        height = np.broadcast_to(pair[:, None, 1, None], (*flat.shape[:2], 1))
-        return np.concatenate([flat, height], axis=2)
-
-    def quads(pairs: Array) -> tuple[Array, Array, Array, Array]:
-        start, stop = swept(pairs[:, 0]), swept(pairs[:, 1])
-        return start[:, :-1], start[:, 1:], stop[:, 1:], stop[:, :-1]
-
-    def split(a: Array, b: Array, c: Array, d: Array) -> Array:
+    def triangles(grid: Array) -> Array:  # (P, 2, segments + 1, n) to (2 P segments, 3, n)
+        (a, b), (d, c) = ((grid[:, k, :-1], grid[:, k, 1:]) for k in (0, 1))
         both = np.stack([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)])
-        return both.reshape(-1, 3, 3)
+        return both.reshape(-1, 3, grid.shape[-1])
 
-    corners = split(*quads(profile))
-    sector = (np.arange(segments) * 8 // segments) % 2
+    corners = triangles(profile[:, :, None, [0, 0, 1]] * turn)
+    count = len(profile)
+    down = 1 - (np.arange(count)[:, None] + [0, 1]) / count
+    across = np.linspace(0.0, 1.0, segments + 1)
+    places = triangles(np.stack(np.broadcast_arrays(across, down[:, :, None]), axis=-1))
     upper = profile[..., 1].mean(axis=1) - middle > 1e-9 * np.abs(profile).max()
-    hue = np.where(upper[:, None], np.array(_UPPER), np.array(_LOWER))
-    colors = np.where(sector[None, :, None] == 0, hue[:, None], np.array(_LIGHT)[None, None])
-    colors = np.tile(colors.reshape(-1, 3), (2, 1)).astype(np.uint8)
-    return _soup(corners, split(*quads(normals)), colors)
+    hue = np.where(upper[:, None], _UPPER, _LOWER)[:, None]
+    light = (np.arange(segments) * 8 // segments % 2)[:, None] == 1
+    colors = np.tile(np.where(light, _LIGHT, hue).reshape(-1, 3), (2, 1))
+    # triangles that shrink to a line where a profile meets the axis carry no area
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    keep = area > 1e-12 * area.max()
+    turned = triangles(normals[:, :, None, [0, 0, 1]] * turn)
+    return Mesh(corners[keep], turned[keep], _painted(colors)[keep], places[keep])
 
 
 def _profile(piece: StraightPiece | Arc, rings: int = MINOR_SEGMENTS) -> tuple[Array, Array]:
@@ -237,8 +221,8 @@ def ball(a: float, b: float, c: float, segments: int = SEGMENTS, rings: int = MI
     unit = _revolve(*_profile(Arc((0.0, 0.0), 1.0, -np.pi / 2, np.pi / 2), rings), segments)
     axes = np.array([a, b, c])
     normals = unit.normals / axes
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return Mesh(unit.vertices * axes, unit.triangles, normals, unit.colors)
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    return replace(unit, corners=unit.corners * axes, normals=normals)
 
 
 def spinning_top(radius: float, height: float, whole: float) -> Mesh:
@@ -258,11 +242,9 @@ def spinning_top(radius: float, height: float, whole: float) -> Mesh:
 def globe(half_sizes: Array, color: Color) -> Mesh:
     """An ellipsoid in belts of two shades of a colour, brighter towards its north pole."""
     mesh = ball(*half_sizes)
-    height = mesh.vertices[mesh.triangles].mean(axis=1)[:, 2] / half_sizes[2]
-    belt = (np.floor((np.arcsin(np.clip(height, -1, 1)) / np.pi + 0.5) * _BELTS).astype(int) % 2) * 0.07
-    shade = (0.78 + 0.2 * height - belt)[:, None]
-    colors = np.clip(np.array(color) * shade, 0, 255).astype(np.uint8)
-    return Mesh(mesh.vertices, mesh.triangles, mesh.normals, np.repeat(colors, 3, axis=0))
+    height = mesh.corners.mean(axis=1)[:, 2:] / half_sizes[2]
+    belt = np.floor((np.arcsin(np.clip(height, -1, 1)) / np.pi + 0.5) * _BELTS) % 2 * 0.07
+    return replace(mesh, colors=_painted(np.array(color) * (0.78 + 0.2 * height - belt)))
 
 
 def graticule(half_sizes: Array, step: float = 30.0, lift: float = 1.004) -> list[Array]:
@@ -283,15 +265,15 @@ def graticule(half_sizes: Array, step: float = 30.0, lift: float = 1.004) -> lis
 
 def sharp_edges(mesh: Mesh) -> Array:
     """Edges (E, 2, 3) of a mesh along which its faces meet at more than 25 degrees."""
-    corners = mesh.vertices[mesh.triangles]
+    corners = mesh.corners
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     # No vertices are shared: rounded coordinates identify those at one place.
     keys = np.round(corners.reshape(-1, 3) / mesh.reach() * 1e6).astype(np.int64)
     _, names = np.unique(keys, axis=0, return_inverse=True)
     names = names.reshape(-1, 3)
-    pairs = np.concatenate([names[:, [0, 1]], names[:, [1, 2]], names[:, [2, 0]]])
-    ends = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    sides = [[0, 1], [1, 2], [2, 0]]
+    pairs, ends = (np.concatenate([table[:, side] for side in sides]) for table in (names, corners))
     faces = np.tile(np.arange(len(corners)), 3)
     sorted_pairs = np.sort(pairs, axis=1)
     order = np.lexsort((sorted_pairs[:, 1], sorted_pairs[:, 0]))
@@ -303,19 +285,5 @@ def sharp_edges(mesh: Mesh) -> Array:
 
 def pictured_globe(half_sizes: Array, name: str) -> Mesh:
     """An ellipsoid textured with the map of ``earth`` or ``moon``."""
-    mesh = ball(*half_sizes)
-    unit = mesh.vertices / half_sizes
-    longitude = np.arctan2(unit[:, 1], unit[:, 0]) / (2 * np.pi) % 1.0
-    latitude = np.arcsin(np.clip(unit[:, 2], -1, 1)) / np.pi
-    corners = longitude.reshape(-1, 3)
-    # Of a triangle that ends at the seam, corners there are at the end of the map and not at its beginning;
-    # one at a pole, where every longitude meets, has that between its neighbours'.
-    seam = (corners < 0.25) & (corners.max(axis=1, keepdims=True) > 0.75)
-    corners = np.where(seam, corners + 1.0, corners)
-    pole = (np.hypot(unit[:, 0], unit[:, 1]) < 1e-9).reshape(-1, 3)
-    others = np.where(pole, 0.0, corners).sum(axis=1, keepdims=True) / (~pole).sum(axis=1, keepdims=True)
-    corners = np.where(pole, others, corners)
-    places = np.stack([corners.ravel(), 0.5 - latitude], axis=1)
     with (files("rigidsim.look") / "data" / f"{name}.png").open("rb") as file:
-        picture = np.asarray(Image.open(file).convert("RGB"))
-    return replace(mesh, picture=picture, places=places)
+        return replace(ball(*half_sizes), picture=np.asarray(Image.open(file).convert("RGB")))

@@ -25,29 +25,7 @@ def thin(dataset: xarray.Dataset, rows: int) -> xarray.Dataset:
     They are read from `ROWS_AT_ONCE` rows of the file at a time: memory goes with `rows`, not with the run's
     length. ``ValueError`` without a `time` dimension or coordinate, or see `thinned_indices`.
     """
-    if "time" not in dataset.dims or "time" not in dataset.coords:
-        raise ValueError("the dataset has no time coordinate: nothing to show along time")
-    count = dataset.sizes["time"]
-    thinned_indices(count, rows)  # refuses what can't be
-    wanted, stride = _along_time(dataset), _stride(count, rows)
-    # A slice is a strided read in HDF5; a list of indices would be read index by index. Each read makes some
-    # kilobytes of notes for every chunk that it touches, hence pieces.
-    piece = stride * max(1, ROWS_AT_ONCE // stride)
-    slices = [slice(first, min(first + piece, count), stride) for first in range(0, count, piece)]
-    if (count - 1) % stride:
-        slices.append(slice(count - 1, count))
-    parts = [wanted.isel(time=part).load() for part in slices]
-    joined = xarray.concat(parts, dim="time", data_vars="all", combine_attrs="override")
-    return joined.transpose("time", ...)
-
-
-def _along_time(dataset: xarray.Dataset) -> xarray.Dataset:
-    along = {str(n): v for n, v in dataset.data_vars.items() if "time" in v.dims and v.dtype.kind in "fiub"}
-    return dataset[[name for name, variable in along.items() if "residual_of" not in variable.attrs]]
-
-
-def _stride(count: int, rows: int) -> int:
-    return max(1, -(-(count - 1) // (rows - 1)))
+    return _thinned(dataset, rows, extremes=False)[0]
 
 
 def thin_with_extremes(dataset: xarray.Dataset, rows: int) -> tuple[xarray.Dataset, xarray.Dataset]:
@@ -55,29 +33,43 @@ def thin_with_extremes(dataset: xarray.Dataset, rows: int) -> tuple[xarray.Datas
     strides in turn, so that a fast motion keeps its amplitude as a curve. The first and the last row's values
     are their own. All rows are read once, `ROWS_AT_ONCE` at a time. See `thin` for errors.
     """
-    count = dataset.sizes.get("time", 0)
-    stride = _stride(count, rows) if rows > 1 else 1
-    if stride == 1:  # every row is shown, or nothing can be
-        found = thin(dataset, rows)
-        return found, found
-    wanted, piece = _along_time(dataset), 2 * stride * max(1, ROWS_AT_ONCE // (2 * stride))
-    plain, extremes = [], []
+    return _thinned(dataset, rows, extremes=True)
+
+
+def _thinned(dataset: xarray.Dataset, rows: int, *, extremes: bool) -> tuple[xarray.Dataset, xarray.Dataset]:
+    if "time" not in dataset.dims or "time" not in dataset.coords:
+        raise ValueError("the dataset has no time coordinate: nothing to show along time")
+    count = dataset.sizes["time"]
+    thinned_indices(count, rows)  # refuses what can't be
+    along = {str(n): v for n, v in dataset.data_vars.items() if "time" in v.dims and v.dtype.kind in "fiub"}
+    wanted = dataset[[name for name, variable in along.items() if "residual_of" not in variable.attrs]]
+    stride = _stride(count, rows)
+    # A slice is a strided read in HDF5; a list of indices would be read index by index. Each read makes some
+    # kilobytes of notes for every chunk that it touches, hence pieces.
+    extremes = extremes and stride > 1
+    step, piece = 1 if extremes else stride, 2 * stride * max(1, ROWS_AT_ONCE // (2 * stride))
+    plain, shown = [], []
     for first in range(0, count, piece):
-        part = wanted.isel(time=slice(first, min(first + piece, count))).load()
-        strided = part.isel(time=slice(None, None, stride))
+        part = wanted.isel(time=slice(first, min(first + piece, count), step)).load()
+        strided = part.isel(time=slice(None, None, stride // step))
         plain.append(strided.copy(deep=True))
-        extremes.append(strided.map(_extremes, args=(part, 2 * stride)))
+        if extremes:
+            shown.append(strided.map(_extremes, args=(part, 2 * stride)))
     if (count - 1) % stride:
-        last = wanted.isel(time=slice(count - 1, count)).load()
-        plain.append(last)
-        extremes.append(last)
-    whole, shown = (
+        plain.append(wanted.isel(time=slice(count - 1, count)).load())
+        shown.append(plain[-1])
+    whole, *curves = (
         xarray.concat(parts, dim="time", data_vars="all", combine_attrs="override").transpose("time", ...)
-        for parts in (plain, extremes)
+        for parts in (plain, *([shown] if extremes else []))
     )
-    for name in shown.data_vars:
-        shown[name].values[[0, -1]] = whole[name].values[[0, -1]]
-    return whole, shown
+    for found in curves:
+        for name in found.data_vars:
+            found[name].values[[0, -1]] = whole[name].values[[0, -1]]
+    return whole, curves[0] if curves else whole
+
+
+def _stride(count: int, rows: int) -> int:
+    return max(1, -(-(count - 1) // (rows - 1)))
 
 
 def _extremes(strided: xarray.DataArray, part: xarray.Dataset, pair: int) -> xarray.DataArray:

@@ -25,6 +25,7 @@ from rigidsim.look.stages.parts import (
 )
 from rigidsim.scene.bodies.presets import KnownBody
 from rigidsim.scene.rotations import quaternion_of
+from rigidsim.scene.row_rotations import multiplied, of_euler
 
 _Planet = KnownBody | None
 ORBIT_BODY = 0.11  # reach of the enlarged body, in units of the orbit's largest distance
@@ -75,7 +76,7 @@ def satellite(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
         angles = signals.values(dataset, "roll_pitch_yaw", 3)
         if angles is None or not np.isfinite(angles).all():
             return None
-        quaternion = quaternion_of(local @ _turned(angles))
+        quaternion = multiplied(quaternion_of(local), of_euler("zyx", angles[:, ::-1]))
     planet = body_of(listed[0])
     known = replace(subject, quaternion=quaternion, attitude=rotation_matrix(quaternion))
     notes = []
@@ -107,20 +108,6 @@ def local_frame(position: Array, normal: Array) -> Array:
     forward = np.cross(np.broadcast_to(normal, position.shape), -down)
     forward = forward / np.linalg.norm(forward, axis=1, keepdims=True)
     return np.stack([forward, np.cross(down, forward), down], axis=2)
-
-
-def _turned(angles: Array) -> Array:
-    """Rotations (rows, 3, 3) from body axes to the local frame for roll, pitch and yaw (rows, 3), 3-2-1."""
-    found = np.eye(3)
-    for k in (2, 1, 0):  # yaw, pitch, roll: about z, y, x
-        i, j = (k + 1) % 3, (k + 2) % 3
-        one = np.zeros((len(angles), 3, 3))
-        one[:, k, k] = 1.0
-        one[:, i, i] = one[:, j, j] = np.cos(angles[:, k])
-        one[:, j, i] = np.sin(angles[:, k])
-        one[:, i, j] = -one[:, j, i]
-        found = found @ one
-    return np.asarray(found)
 
 
 def _orbit(

@@ -257,14 +257,12 @@ def fixed_arrow(
 def solid(path: str, mesh: Mesh, *, clear: Color | None = None) -> Part:
     """A mesh, in units of the stage; with a colour a translucent one."""
     # without normals the viewer shows a mesh's own colours from all sides
-    worn: dict[str, Any] = {"vertex_colors": mesh.colors}
+    worn: dict[str, Any] = {"vertex_colors": np.repeat(mesh.colors, 3, axis=0)}
     if mesh.picture is not None:
-        worn = {"albedo_texture": mesh.picture, "vertex_texcoords": mesh.places}
+        worn = {"albedo_texture": mesh.picture, "vertex_texcoords": mesh.places.reshape(-1, 2)}
     if clear is not None:
-        worn = {"albedo_factor": (*clear, 70), "vertex_normals": mesh.normals.astype(np.float32)}
-    drawn = rr.Mesh3D(
-        vertex_positions=mesh.vertices.astype(np.float32), triangle_indices=mesh.triangles, **worn
-    )
+        worn = {"albedo_factor": (*clear, 70), "vertex_normals": mesh.normals.reshape(-1, 3)}
+    drawn = rr.Mesh3D(vertex_positions=mesh.vertices.astype(np.float32), **worn)
     return Part(path, [drawn], None, mesh.vertices)
 
 

@@ -94,12 +94,11 @@ def _turning(dataset: xarray.Dataset, rotor: RecordedRotor, slower: float) -> Ar
 def _mesh(radius: float) -> Mesh:
     """A disc across z, one sector of it bright."""
     mesh = solid_mesh("cylinder", {"radius": [radius], "height": [radius * _FLATNESS]})
-    middles = mesh.vertices[mesh.triangles].mean(axis=1)
+    middles = mesh.corners.mean(axis=1)
     marked = np.abs(np.arctan2(middles[:, 1], middles[:, 0])) < _MARKED
-    rim = np.abs(mesh.normals[mesh.triangles[:, 0], 2]) < 0.5
-    colors = np.where(rim[:, None], _DARK, _METAL)
-    colors = np.where(marked[:, None], _MARK, colors)
-    return replace(mesh, colors=np.repeat(colors.astype(np.uint8), 3, axis=0))
+    rim = np.abs(mesh.normals[:, 0, 2]) < 0.5
+    colors = np.where(marked[:, None], _MARK, np.where(rim[:, None], _DARK, _METAL))
+    return replace(mesh, colors=colors.astype(np.uint8))
 
 
 def _momenta(dataset: xarray.Dataset, stage: Stage, found: list[RecordedRotor], notes: list[str]) -> None:
