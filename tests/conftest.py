@@ -1,5 +1,6 @@
 """Shared fixtures."""
 
+import gc
 import os
 import shutil
 import sys
@@ -10,11 +11,16 @@ from pathlib import Path
 
 import pytest
 
+# What collection makes lives as long as the tests do; searching it for garbage took 3.5 of 16 s.
+gc.disable()
+# Workers, and the processes that tests start, find the package compiled.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 os.environ.setdefault("CI", "1")  # rerun's viewer collects no statistics then
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1]))  # the studies are no installed package
 
-from rigidsim import SavedRun, parse  # noqa: F401  (tests that read configs below need every kind of load)
+from rigidsim import SavedRun, parse  # noqa: E402, F401  (tests that read configs below need every kind of load)
 
 TERMINAL = shutil.get_terminal_size().columns
 # Whatever terminal the tests are started from, and however long the path of their temporary folder: no line
@@ -34,6 +40,19 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
     )  # long runs step long
     with nullcontext() if optimised else unoptimised_code():
         return (yield)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    import support
+
+    given = config.option.markexpr
+    support.campaigns_asked = not given or "campaign" in given.replace("not campaign", "")
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """From here on garbage is searched for among what the tests themselves make."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
