@@ -1,6 +1,7 @@
 """What a scene is about: the curves and planes shown first, its numbers in words, and pages of text."""
 
 import re
+from collections.abc import Callable
 
 import numpy as np
 import xarray
@@ -8,7 +9,7 @@ import xarray
 from rigidsim.look import gyrostats, signals, sources
 from rigidsim.look.curves import CURVES, STATES, orientations, precesses
 from rigidsim.look.fits import circulation, secular
-from rigidsim.look.record import read_config, scene_of
+from rigidsim.look.record import scene_of
 from rigidsim.look.signals import title_of
 from rigidsim.look.solids import Array
 from rigidsim.scene.readable import TimeWords, angle_text, span_text, turning_text
@@ -30,45 +31,75 @@ def leading(rows: xarray.Dataset) -> tuple[Names, Names]:
     """Names of curves, and of planes, that suit a dataset in memory, with rates of rotors and user-defined
     states; those that it has nothing for are left out by whoever draws them.
     """
-    curves, planes = _of_body(rows)
-    extra = [] if "rotor_rates" in curves else ["rotor_rates"]
-    return [*curves, *extra, *STATES], planes
+    moving, free = (["path"], []) if "position" in rows else ([], ["herpolhode"])
+    near = signals.near_axis(rows)
+    core = "core_angular_velocity" in rows and "angular_velocity" in rows
+    bare = not {"quaternion", "euler_angles", "angular_velocity"} & set(
+        rows
+    )  # only axes, of an averaged model
 
+    def shows(name: str) -> bool:
+        return CURVES[name](rows) is not None
 
-def _of_body(rows: xarray.Dataset) -> tuple[Names, Names]:
-    moving = ["path"] if "position" in rows else []
-    near, core = signals.near_axis(rows), "core_angular_velocity" in rows and "angular_velocity" in rows
-    if scene_of(rows).has_rotors and gyrostats.Gyrostat.of(rows, 0) is not None:
-        return ["rotor_tilts", "rotor_rates", "rates"], ["momentum_sphere", "momentum_sphere_at_end"]
-    if sources.librates(rows):
-        if CURVES["latitude_libration"](rows) is not None:  # its figure axis precesses, as the Moon's
-            return ["longitude_libration", "latitude_libration", "libration"], ["sub_source", "nadir"]
-        return ["libration", "roll_pitch_yaw", "pointing"], ["nadir", *(moving or ["phases"])]
-    if signals.is_top(rows):
-        turning = "precession" if "precession_angle" in rows else "attitude"
-        return ["tilt", turning], ["tip"]
-    if CURVES["locking"](rows) is not None:
-        return ["rates", "locking"], [*moving, "locking_phases"]
-    if core:
-        precessing = precesses(rows) or not near
-        return ["core_axis", "core_slip"], [*moving, "polar_motion" if precessing else "pole_path"]
-    if near and "principal_moments" in rows:
-        return ["rates", "moments", "wobble"], [*moving, "polar_motion"]
-    if near and CURVES[STATES[0]](rows) is not None:
-        return ["wobble", "rates"], [*moving, "polar_motion"]
-    if near and precesses(rows) and not moving:
-        return ["braking", "obliquity", "longitude"], ["nutation", "pole_path"]
-    if near:
-        return ["braking", *(["wobble_and_spin"] if moving else []), "polar_motion"], [
-            "polar_motion",
-            *moving,
-        ]
-    if moving and sources.pointing_angle(rows) is not None:
-        return ["pointing", "rates", "spin_down"], [*moving, "polhode"]
-    if not {"quaternion", "euler_angles", "angular_velocity"} & set(rows):  # only axes, of an averaged model
-        axes = ["obliquity", "longitude"] if precesses(rows) else ["wobble"]
-        return ["braking", *axes], ["nutation", "pole_path"]
-    return ["rates", "attitude", "spin_down"], [*moving, "polhode", *([] if moving else ["herpolhode"])]
+    kinds: list[tuple[Callable[[], bool], Names, Names]] = [
+        (
+            lambda: scene_of(rows).has_rotors and gyrostats.Gyrostat.of(rows, 0) is not None,
+            ["rotor_tilts", "rotor_rates", "rates"],
+            ["momentum_sphere", "momentum_sphere_at_end"],
+        ),
+        (  # its figure axis precesses, as the Moon's
+            lambda: sources.librates(rows) and shows("latitude_libration"),
+            ["longitude_libration", "latitude_libration", "libration"],
+            ["sub_source", "nadir"],
+        ),
+        (
+            lambda: sources.librates(rows),
+            ["libration", "roll_pitch_yaw", "pointing"],
+            ["nadir", *(moving or ["phases"])],
+        ),
+        (
+            lambda: signals.is_top(rows),
+            ["tilt", "precession" if "precession_angle" in rows else "attitude"],
+            ["tip"],
+        ),
+        (lambda: shows("locking"), ["rates", "locking"], [*moving, "locking_phases"]),
+        (
+            lambda: core and (precesses(rows) or not near),
+            ["core_axis", "core_slip"],
+            [*moving, "polar_motion"],
+        ),
+        (lambda: core, ["core_axis", "core_slip"], [*moving, "pole_path"]),
+        (
+            lambda: near and "principal_moments" in rows,
+            ["rates", "moments", "wobble"],
+            [*moving, "polar_motion"],
+        ),
+        (lambda: near and shows(STATES[0]), ["wobble", "rates"], [*moving, "polar_motion"]),
+        (
+            lambda: near and not moving and precesses(rows),
+            ["braking", "obliquity", "longitude"],
+            ["nutation", "pole_path"],
+        ),
+        (
+            lambda: near,
+            ["braking", *(["wobble_and_spin"] if moving else []), "polar_motion"],
+            ["polar_motion", *moving],
+        ),
+        (
+            lambda: bool(moving) and sources.pointing_angle(rows) is not None,
+            ["pointing", "rates", "spin_down"],
+            [*moving, "polhode"],
+        ),
+        (
+            lambda: bare and precesses(rows),
+            ["braking", "obliquity", "longitude"],
+            ["nutation", "pole_path"],
+        ),
+        (lambda: bare, ["braking", "wobble"], ["nutation", "pole_path"]),
+        (lambda: True, ["rates", "attitude", "spin_down"], [*moving, "polhode", *free]),
+    ]
+    curves, planes = next((curves, planes) for holds, curves, planes in kinds if holds())
+    return list(dict.fromkeys([*curves, "rotor_rates", *STATES])), planes
 
 
 def numbers(rows: xarray.Dataset) -> list[tuple[str, str]]:
@@ -134,7 +165,7 @@ def _flips(seconds: Array, rates: Array) -> float:
 
 def summary_page(dataset: xarray.Dataset, thinned: xarray.Dataset) -> str:
     """Markdown page, short enough to be seen whole: what was run, and the motion's own numbers."""
-    said = str(read_config(dataset).get("description") or "").strip().replace("\n", " ")
+    said = str(dataset.attrs.get("comment", "")).strip().replace("\n", " ")
     attributes = dataset.attrs
     start, end = (float(thinned["time"].values[i]) for i in (0, -1))
     words, total = TimeWords.of(attributes, start, end), dataset.sizes["time"]

@@ -141,12 +141,12 @@ def _of_version_1_0(dataset: xarray.Dataset) -> dict[str, Any]:
         except (KeyError, ValueError):
             return None
 
-    config = read_config(dataset)
+    try:
+        config = tomllib.loads(str(dataset.attrs.get("config", "")))
+    except tomllib.TOMLDecodeError:
+        config = {}
     frame, recorded = config.get("frame", {}), listed("surroundings") or []
     axis, normal = frame.get("figure_axis"), frame.get("reference")
-    for one in recorded:  # of a version in between
-        if one["what"] == "frame":
-            axis, normal = one["figure_axis"], normal and (one["reference_normal"] or "moving")
     numbers = isinstance(normal, list) and all(isinstance(x, float | int) for x in normal)
     pull = next((one["acceleration"] for one in recorded if one["what"] == "gravity"), None)
     return {
@@ -165,14 +165,6 @@ def _of_version_1_0(dataset: xarray.Dataset) -> dict[str, Any]:
         "gravity": pull,
         "objects": recorded,
     }
-
-
-def read_config(dataset: xarray.Dataset) -> dict[str, Any]:
-    """The embedded config as a dictionary; empty when there is none or it can't be read."""
-    try:
-        return tomllib.loads(str(dataset.attrs.get("config", "")))
-    except tomllib.TOMLDecodeError:
-        return {}
 
 
 def body_of(one: dict[str, Any]) -> KnownBody | None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray
 
-from rigidsim.look.record import read_config, scene_of
+from rigidsim.look.record import scene_of
 from rigidsim.look.solids import Array, rotation_matrix
 from rigidsim.scene.epochs import J2000
 from rigidsim.scene.readable import YEAR, TimeUnit, epoch_of, julian_year, unit_of
@@ -30,8 +30,8 @@ _SPREAD = 1e-5  # of the energy, up to which it counts as constant: more than ro
 
 
 def title_of(dataset: xarray.Dataset) -> str:
-    """Title of the run: attribute `title`, else the config's name."""
-    return str(dataset.attrs.get("title") or read_config(dataset).get("name") or "rigid body")
+    """Title of the run."""
+    return str(dataset.attrs.get("title") or "rigid body")
 
 
 def in_words(name: str) -> str:

@@ -25,7 +25,7 @@ def secular(unit: str = "yr") -> xarray.Dataset:
             "node_rate": ("tilt", rate, {"units": "rad/s", "long_name": "secular rate of node"}),
         },
         coords={"tilt": ("tilt", tilt, {"units": "rad", "swept_key": "initial.euler_angles[1]"})},
-        attrs={"config": f'[time]\nunit = "{unit}"'},
+        attrs={"time_unit": unit},
     )
 
 

@@ -294,19 +294,24 @@ def figure(dataset: xarray.Dataset, what: str = OVERVIEW) -> Figure:
     Raises:
         ValueError: no such figure, none for this dataset, or a dataset without samples.
     """
+    shown, kind = _asked(dataset, what)
+    return compose(shown, kind.curves, kind.planes, facts=what == OVERVIEW)
+
+
+def _asked(dataset: xarray.Dataset, what: str) -> tuple[Shown, Kind]:
     check_name(what)
+    if what == SPECTRUM:
+        raise ValueError("figure 'spectrum': is drawn of an analysis: rigidsim.analyse(run).figure()")
     shown = Shown.of(dataset)
     if what == OVERVIEW:
         curves, planes = leading(shown.rows)
-        return compose(shown, (*curves, "drift"), planes, facts=True)
-    if what == SPECTRUM:
-        raise ValueError("figure 'spectrum': is drawn of an analysis: rigidsim.analyse(run).figure()")
+        return shown, Kind("", (*curves, "drift"), planes)
     kind = KINDS[what]
     if not kind.shows(shown.rows):
         raise ValueError(
             f"figure {what!r}: needs {kind.needs}; possible for this run: {', '.join(available(dataset))}"
         )
-    return compose(shown, kind.curves, kind.planes)
+    return shown, kind
 
 
 def for_slides(dataset: xarray.Dataset, what: str = OVERVIEW, ground: str = "light") -> Figure:
@@ -315,19 +320,17 @@ def for_slides(dataset: xarray.Dataset, what: str = OVERVIEW, ground: str = "lig
     Raises:
         ValueError: as for ``figure``, or another ground.
     """
-    check_name(what)
     if ground not in GROUNDS:
         raise ValueError(f"--for-slides: given {ground!r}; {' or '.join(GROUNDS)} is allowed")
-    shown = Shown.of(dataset)
-    curves, planes = leading(shown.rows) if what == OVERVIEW else ((), ())
-    kind = KINDS.get(what, Kind("", curves, planes))
-    groups = [(CURVES, kind.curves), (PLANES, kind.planes)]
-    for panels, names in groups if what == OVERVIEW else reversed(groups):  # first what it is named for
-        for name, found in found_of(panels, names, shown.rows)[:1]:
-            return slide(shown, name, found, ground)
-    raise ValueError(
-        f"figure {what!r}: this run has no panel of it for a slide; it has {', '.join(available(dataset))}"
-    )
+    shown, kind = _asked(dataset, what)
+    groups: list[tuple[Finders, Sequence[str]]] = [(CURVES, kind.curves), (PLANES, kind.planes)]
+    # first what it is named for
+    for panels, names in groups if what == OVERVIEW or not kind.planes else reversed(groups):
+        for name in names:
+            panel = panels[name](shown.rows)
+            if panel is not None:
+                return slide(shown, name, panel, ground)
+    raise ValueError(f"figure {what!r}: this run has no panel of it for a slide")
 
 
 def check_name(what: str) -> None:
@@ -347,12 +350,9 @@ def save_figure(
     ``ValueError`` for another suffix, too.
     """
     path = Path(path)
-    file_format = file_format or figure_format(path)
-    if slides is not None:
-        page = for_slides(dataset, what, slides)
-        page.savefig(path, dpi=_SLIDE_DOTS, format=file_format, facecolor=page.get_facecolor())
-        return path
-    figure(dataset, what).savefig(path, dpi=_DOTS, format=file_format)
+    page = figure(dataset, what) if slides is None else for_slides(dataset, what, slides)
+    dots, ground = _DOTS if slides is None else _SLIDE_DOTS, page.get_facecolor()
+    page.savefig(path, dpi=dots, format=file_format or figure_format(path), facecolor=ground)
     return path
 
 

@@ -20,7 +20,6 @@ from matplotlib.ticker import MaxNLocator
 
 from rigidsim.look.plots import HUES, XYZ
 from rigidsim.look.plots import PALETTE as NAMES
-from rigidsim.look.record import read_config
 from rigidsim.look.signals import finite_rows, joined, title_of
 from rigidsim.look.solids import Array
 
@@ -111,7 +110,7 @@ def sheet(title: str, width: float, height: float) -> ShownFigure:
 
 def blank(dataset: xarray.Dataset, width: float, height: float) -> Figure:
     """An empty page (inches; height below the heading) with the run's name and description above."""
-    description = " ".join(str(read_config(dataset).get("description", "")).split())
+    description = " ".join(str(dataset.attrs.get("comment", "")).split())
     title = title_of(dataset)
     if description == title:
         description = ""

@@ -18,7 +18,6 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from rigidsim.look.figures.style import GREY, INK, PALE, PALETTE, blank, key, styled, titled
-from rigidsim.look.record import read_config
 from rigidsim.look.solids import Array
 from rigidsim.scene.readable import pretty_unit, scaled, with_unit
 
@@ -119,11 +118,11 @@ def _named(variable: xarray.DataArray, unit: str | None = None) -> str:
 
 def _unit_of(dataset: xarray.Dataset, variable: xarray.DataArray) -> tuple[float, str]:
     """Divisor and name of a unit that suits the scene."""
-    asked = read_config(dataset).get("time", {}).get("unit") or dataset.attrs.get("time_unit")
     plain = pretty_unit(str(variable.attrs.get("units", "")))
-    if variable.dtype.kind != "f" or (plain not in ("s", "rad") and not (plain == "rad/s" and asked)):
+    asked = bool(dataset.attrs.get("time_unit"))
+    if variable.dtype.kind != "f" or plain not in ("s", "rad", *["rad/s"] * asked):
         return 1.0, plain
-    return scaled(np.asarray(variable.values), plain, {"time_unit": asked})
+    return scaled(np.asarray(variable.values), plain, dataset.attrs)
 
 
 def _members(dataset: xarray.Dataset) -> list[str]:

@@ -377,6 +377,7 @@ def _completed(wanted: Sweep, folder: SweepFolder, wall: float, cpu: float) -> S
         "Conventions": "CF-1.11",
         "title": wanted.experiment.config.name,
         "comment": wanted.experiment.config.description,
+        "time_unit": wanted.experiment.config.time.unit or "",
         "source": "rigidsim",
         "kind": "sweep",
         "schema_version": SCHEMA_VERSION,
