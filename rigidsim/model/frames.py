@@ -47,14 +47,12 @@ from rigidsim.scene.frame import ORBIT
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.starts import (
-    ATTITUDES,
+    STARTS,
     InitialRotation,
-    StartForm,
     angle_out_of_range,
     attitude_from_pole,
     from_equator,
     meridian,
-    register_start,
 )
 
 
@@ -279,4 +277,4 @@ def _from_obliquity(scene: Scene) -> InitialRotation:
     return InitialRotation(attitude.unit_quaternion(context, quaternion))
 
 
-register_start(ATTITUDES, StartForm("obliquity", _from_obliquity, ("node_longitude",), ("prime_meridian",)))
+STARTS["obliquity"] = _from_obliquity

@@ -132,10 +132,8 @@ class SceneLoad:
             loads add up to the scene's gravity. None for all others.
         axes: what the space axes are in its own equations; None if these hold in any axes.
         epoch: date of time 0 in its own equations; None if these have none.
-        bearing: moment (mpf, kg m^2) and unit axis (body axes) of what turns on a bearing of its own, which
-            torques on the body don't accelerate about that axis; None for all others.
-        apart: tensor of inertia (mpf, kg m^2, body axes) of what doesn't turn with the body, a fluid core's,
-            which is part of the body's own; None for all others.
+        apart: tensor of inertia (mpf, kg m^2, body axes) of what doesn't turn with the body, a fluid core or
+            a rotor about its axis, which is part of the body's own; None for all others.
         inner_momentum: angular momentum relative to the body at the start (mpf, body axes); None for none.
         sights: bodies of a kernel that it sees, each with the highest derivative of its place that is to be
             a state.
@@ -147,7 +145,6 @@ class SceneLoad:
     uniform_field: Vector | None = None
     axes: str | None = None
     epoch: Epoch | None = None
-    bearing: tuple[Any, Vector] | None = None
     apart: Matrix | None = None
     inner_momentum: Vector | None = None
     sights: tuple[tuple[RelativeEphemeris, int], ...] = ()

@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import Field, StrictBool
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene.arithmetic import Matrix, Vector, cross, diagonal, dot, eigen
+from rigidsim.scene.arithmetic import Matrix, cross, diagonal, dot, eigen
 from rigidsim.scene.bodies.body import RigidBody
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import (
@@ -23,9 +23,6 @@ from rigidsim.scene.fields import (
 from rigidsim.scene.swept import plain
 
 _ROUNDING_OF_INPUT = 1e-14  # relative, of moments that a double-precision program printed
-
-Bearing = tuple[Any, Vector]
-"""Moment (mpf, kg m^2) of a rotor about its axis, and the axis (unit, body axes)."""
 
 
 class RotorTable(ConfigTable):
@@ -49,20 +46,14 @@ class RotorTable(ConfigTable):
     """a motor keeps the rate, whatever torque that takes"""
 
 
-def turning_inertia(
-    context: Any, body: RigidBody, bearings: Sequence[Bearing], apart: Sequence[Matrix] = ()
-) -> tuple[Matrix, Matrix]:
-    """Tensor of what turns with the body, I - sum of J a a^T over rotors that turn on bearings and less the
-    tensors of what turns ``apart``, and its inverse: by elements, so that numbers of a sweep stay in it.
+def turning_inertia(context: Any, body: RigidBody, apart: Sequence[Matrix]) -> tuple[Matrix, Matrix]:
+    """Tensor of what turns with the body, its own less the tensors of what turns ``apart``, and its inverse:
+    by elements, so that numbers of a sweep stay in it.
 
     Raises:
         ConfigError: no body has such a tensor.
     """
-    tensor = [list(row) for row in body.inertia]
-    for moment, axis in bearings:
-        for i, row in enumerate(tensor):
-            for j in range(3):
-                row[j] -= moment * axis[i] * axis[j]
+    tensor = body.inertia
     for other in apart:
         tensor = [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(tensor, other, strict=True)]
     half = sum((tensor[i][i] for i in range(3)), context.zero) / 2

@@ -215,11 +215,10 @@ def _with_loads(begun: Setting, samples: SampleTimes, source: str) -> Scene:
     """The scene with any start."""
     setting, given, tabled, resolved = _resolved(begun)
     config, context, body = setting.config, setting.context, setting.body
-    bearings = [load.bearing for load in resolved if load.bearing is not None]
     apart = [load.apart for load in resolved if load.apart is not None]
     turning = body.inertia, inverse_inertia(context, body)
-    if bearings or apart:
-        turning = turning_inertia(context, body, bearings, apart)
+    if apart:
+        turning = turning_inertia(context, body, apart)
     fields = [load.uniform_field for load in resolved if load.uniform_field is not None]
     gravity = [sum(x, context.zero) for x in zip(*fields, strict=True)] if fields else None
     pulled = setting.free_flight or any(x != 0 for x in body.center_of_mass)

@@ -1,9 +1,9 @@
-"""Starts: the ways in which ``[initial]`` gives an attitude, rates, or both, one entry each; and where a free
-flight begins: position and velocity as given, in a dated frame, or two-line elements.
+"""Starts: the ways in which ``[initial]`` gives an attitude, rates, or both; and where a free flight begins:
+position and velocity as given, in a dated frame, or two-line elements.
 
-A way has the key that chooses it, and the keys that it takes beside. One way gives the attitude (by default
-the body axes are along the space axes) and one the rates; an equilibrium, which is found, gives both. Ways
-that need mechanics, such as the plane of an orbit, are registered by the rooms above.
+One key gives the attitude (by default the body axes are along the space axes) and one the rates; an
+equilibrium, which is found, gives both. Ways that need mechanics, such as the plane of an orbit, are entered
+by the rooms above.
 
 An attitude from the pole of the body's equator is R = R3(node) R1(tilt) R3(turn) F^T, with the figure's
 equator and pole as columns of F: the equator rises through the plane at the node, its pole is tilted from the
@@ -14,7 +14,7 @@ these are a + 90 deg, 90 deg - d and W for the pole's right ascension a and decl
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import partial
@@ -25,12 +25,11 @@ from rigidsim.scene import attitude, space_axes
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, minus, negligible, plus, transpose, vector
 from rigidsim.scene.bodies.body import RigidBody, inverse_inertia
 from rigidsim.scene.bodies.presets import EARTH
-from rigidsim.scene.epochs import Epoch
+from rigidsim.scene.earth_frames import itrf, sgp4, teme
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.registry import Setting
 from rigidsim.scene.schema import Config, Initial
 from rigidsim.scene.space_axes import ECLIPTIC, obliquity, to_ecliptic
-from rigidsim.scene.two_line_elements import TwoLineElements
 
 
 @dataclass(frozen=True)
@@ -50,35 +49,15 @@ class InitialRotation:
     found: Any = None
 
 
-@dataclass(frozen=True)
-class StartForm:
-    """One way to give a part of the start.
-
-    Attributes:
-        key: the key of ``[initial]`` that chooses it.
-        resolve: from the scene so far to an ``InitialRotation``, or of rates to an angular velocity; raises
-            ``ConfigError``.
-        needed: keys that must stand beside it.
-        allowed: keys that may stand beside it.
-    """
-
-    key: str
-    resolve: Callable[[Any], Any]
-    needed: tuple[str, ...] = ()
-    allowed: tuple[str, ...] = ()
-
-
-ATTITUDES: dict[str, StartForm] = {}
-RATES: dict[str, StartForm] = {}
-EQUILIBRIA: dict[str, StartForm] = {}
-"""By name instead of key: what may stand beside are ways to give attitude or rates."""
-_BESIDE = ("prime_meridian", "node_longitude")  # which give nothing alone
-
-
-def register_start(ways: dict[str, StartForm], way: StartForm, name: str = "") -> None:
-    """Register a way in ``ATTITUDES``, ``RATES`` or ``EQUILIBRIA``; ``ValueError`` if the name is taken."""
-    known = ways.setdefault(name or way.key, way)
-    ensure(known.resolve is way.resolve, ValueError(f"a start by {name or way.key} is registered already"))
+ATTITUDES = ("quaternion", "euler_angles", "pole", "obliquity")
+RATES = ("angular_velocity", "angular_momentum", "spin_period")
+"""Keys of ``[initial]``, of which one gives the attitude and one the rates."""
+_BESIDE = {"node_longitude": ("obliquity",), "prime_meridian": ("pole", "obliquity")}
+"""Keys that give nothing alone, and what each counts with."""
+_BESIDE_FOUND = {"relative": ATTITUDES}
+"""What may stand beside an equilibrium; a Cassini state takes a period."""
+STARTS: dict[str, Callable[[Any], InitialRotation]] = {}
+"""Starts that rooms above find, by names of equilibria and keys: from the scene so far; ConfigError."""
 
 
 def refusal(key: str, text: str) -> ConfigError:
@@ -94,47 +73,53 @@ def angle_out_of_range(key: str, what: str, context: Any, angle: Any, allowed: s
 
 def check_ways(table: Initial) -> None:
     """Refuse what contradicts itself before anything is worked out."""
-    ways = [_chosen(table, ATTITUDES, "attitude"), _chosen(table, RATES, "start of the rates")]
-    equilibrium = EQUILIBRIA[table.equilibrium] if table.equilibrium is not None else None
-    for way in filter(None, ways if equilibrium else ()):
-        what = f'given with equilibrium = "{table.equilibrium}", which finds it; remove one of them'
-        ensure(equilibrium and way.key in equilibrium.allowed, refusal(way.key, what))
-    either = ", ".join(" with ".join((way.key, *way.needed)) for way in RATES.values())
-    what = f"missing; exactly one of {either} and equilibrium is needed"
-    ensure(equilibrium or ways[1], refusal("angular_velocity", what))
-    beside = {key for way in (ways[0], equilibrium) if way for key in (*way.needed, *way.allowed)}
-    for key in _BESIDE:
-        takers = [way.key for way in ATTITUDES.values() if key in (*way.needed, *way.allowed)]
-        what = f"given without {' or '.join(takers)}, with which it counts; add that"
-        ensure(getattr(table, key) is None or key in beside, refusal(key, what))
+    found, ways = table.equilibrium, [_given(table, ATTITUDES), _given(table, RATES)]
+    for way, what in zip(ways, ("attitude", "start of the rates"), strict=True):
+        for other in way[1:]:
+            text = f"given with {way[0]}; only one {what} is allowed: remove one of them"
+            raise refusal(other, text)
+        for key in way if found is not None else ():
+            text = f'given with equilibrium = "{found}", which finds it; remove one of them'
+            ensure(key in _BESIDE_FOUND.get(str(found), ("spin_period",)), refusal(key, text))
+    text = f"missing; exactly one of {', '.join(RATES)} and equilibrium is needed"
+    ensure(found is not None or ways[1], refusal("angular_velocity", text))
+    for key, takers in _BESIDE.items():
+        text = f"given without {' or '.join(takers)}, with which it counts; add that"
+        ensure(getattr(table, key) is None or _given(table, takers), refusal(key, text))
+    known = table.obliquity is None or table.node_longitude is not None
+    ensure(known, refusal("node_longitude", "missing; obliquity needs it"))
 
 
-def _chosen(table: Initial, ways: dict[str, StartForm], what: str) -> StartForm | None:
-    """The way whose keys are given; None without any."""
-    given = [way for way in ways.values() if getattr(table, way.key) is not None]
-    for other in given[1:]:
-        text = f"given with {given[0].key}; only one {what} is allowed: remove one of them"
-        raise refusal(other.key, text)
-    for key in given[0].needed if given else ():
-        ensure(getattr(table, key) is not None, refusal(key, f"missing; {given[0].key} needs it"))
-    return given[0] if given else None
+def _given(table: Initial, keys: Iterable[str]) -> list[str]:
+    return [key for key in keys if getattr(table, key) is not None]
 
 
 def attitude_of(scene: Setting) -> InitialRotation:
     """The attitude at the start of a scene; by default the body axes are along the space axes."""
-    way = _chosen(scene.config.initial, ATTITUDES, "")
-    return way.resolve(scene) if way else InitialRotation([scene.context.one] + [scene.context.zero] * 3)
+    table = scene.config.initial
+    if table.pole is not None:
+        return _from_pole(scene)
+    if table.obliquity is not None:
+        return STARTS["obliquity"](scene)
+    sequence = scene.config.integrator.euler_sequence
+    given = attitude.given_attitude(scene.context, table, sequence, refusal)
+    if given is None:
+        return InitialRotation([scene.context.one] + [scene.context.zero] * 3)
+    return InitialRotation(given[0], euler_angles=given[1])
 
 
 def rotation_of(scene: Any) -> InitialRotation:
     """Attitude and rates at the start of a scene that has an attitude."""
     table = scene.config.initial
     if table.equilibrium is not None:
-        key, start = "equilibrium", EQUILIBRIA[table.equilibrium].resolve(scene)
+        key, start = "equilibrium", STARTS[table.equilibrium](scene)
     else:
-        rates = _chosen(table, RATES, "")
-        assert rates is not None
-        key, start = rates.key, InitialRotation(scene.quaternion, rates.resolve(scene), scene.euler_angles)
+        (key,), rates = _given(table, RATES), vector(scene.context, table.angular_velocity)
+        if key == "angular_momentum":
+            rates = from_momentum(scene)
+        elif key == "spin_period":
+            rates = [spin_rate(scene) * x for x in scene.figure.pole]
+        start = InitialRotation(scene.quaternion, rates, scene.euler_angles)
     what = "has a spin about the axis that has no moment of inertia, where a spin means nothing; make that "
     ensure(not _along_massless(scene.body, start.angular_velocity), refusal(key, what + "component zero"))
     return start
@@ -149,13 +134,6 @@ def _along_massless(body: RigidBody, vector: Vector) -> bool:
 
 
 # --- attitudes ----------------------------------------------------------------------------------------------
-
-
-def _as_written(scene: Setting) -> InitialRotation:
-    sequence = scene.config.integrator.euler_sequence
-    given = attitude.given_attitude(scene.context, scene.config.initial, sequence, refusal)
-    assert given is not None
-    return InitialRotation(given[0], euler_angles=given[1])
 
 
 def attitude_from_pole(scene: Setting, node: Any, tilt: Any, turn: Any) -> Vector:
@@ -198,11 +176,8 @@ def meridian(scene: Setting) -> Any:
 # --- rates --------------------------------------------------------------------------------------------------
 
 
-def _given_rates(scene: Setting) -> Vector:
-    return vector(scene.context, scene.config.initial.angular_velocity)
-
-
-def _from_momentum(scene: Any) -> Vector:
+def from_momentum(scene: Any) -> Vector:
+    """The rates (mpf, body axes) of a momentum in space."""
     to_body = transpose(attitude.rotation_matrix(scene.quaternion))
     momentum = apply(to_body, vector(scene.context, scene.config.initial.angular_momentum))
     what = "has a part along the axis that has no moment of inertia; make that part zero"
@@ -218,28 +193,8 @@ def spin_rate(scene: Setting) -> Any:
     return 2 * scene.context.pi / scene.config.initial.spin_period.at(scene.context)
 
 
-for _way in (
-    StartForm("quaternion", _as_written),
-    StartForm("euler_angles", _as_written),
-    StartForm("pole", _from_pole, allowed=("prime_meridian",)),
-):
-    register_start(ATTITUDES, _way)
-for _way in (
-    StartForm("angular_velocity", _given_rates),
-    StartForm("angular_momentum", _from_momentum),
-    StartForm("spin_period", lambda scene: [spin_rate(scene) * x for x in scene.figure.pole]),
-):
-    register_start(RATES, _way)
-
-
 # --- flights ------------------------------------------------------------------------------------------------
 
-Rotation = tuple[list[list[float]], list[float]]
-"""Matrix from a frame to GCRF, and the frame's angular velocity in GCRF (rad/s)."""
-ROTATIONS: dict[str, Callable[[Epoch], Rotation]] = {}
-"""By name of a frame, entered from the room of mechanics; others are GCRF's axes, to 0.02 arcsec."""
-PROPAGATORS: dict[str, Callable[[TwoLineElements, Epoch], tuple[list[float], list[float]]]] = {}
-"""SGP4 by its name: to position and velocity in TEME, m and m/s. Both raise ``ValueError``."""
 _STRENGTH = f"{EARTH.gravitational_parameter:g} m^3/s^2"
 
 
@@ -261,10 +216,10 @@ def flight_start(config: Config, context: Any) -> tuple[Vector, Vector]:
     try:
         date = date.after(Decimal(repr(float(config.time.start))))
         if table.tle is not None:
-            found = PROPAGATORS["SGP4"](table.tle, date)
+            found = sgp4(table.tle, date)
             position, velocity = ([context.mpf(x) for x in one] for one in found)
-        if frame in ROTATIONS:
-            rows, turning = ROTATIONS[frame](date)
+        if frame in ("ITRF", "TEME"):  # others are GCRF's axes, to 0.02 arcsec
+            rows, turning = itrf(date) if frame == "ITRF" else teme(date)
             matrix = [[context.mpf(x) for x in row] for row in rows]
             position, velocity = apply(matrix, position), apply(matrix, velocity)
             velocity = plus(velocity, cross([context.mpf(x) for x in turning], position))

@@ -25,11 +25,6 @@ _FAILURES = (ZeroDivisionError, ValueError, OverflowError, TypeError)
 """Errors of mpmath for numbers outside the range of an operation (of complex numbers none is the larger); the
 member's own build reports them.
 """
-_FUNCTIONS = (
-    "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "hypot", "exp", "log", "sinh", "cosh", "tanh",
-    "asinh", "acosh", "atanh", "erf",
-)  # fmt: skip
-"""Functions of swept numbers besides square roots; any other use of one is refused."""
 
 
 class Untraceable(Exception):
@@ -318,13 +313,11 @@ class SweptContext:
         if isinstance(value, Fraction):
             return self.plain.mpf(value.numerator) / self.plain.mpf(value.denominator)
         try:
-            return self.plain.convert(value)
+            return +self.plain.convert(value)  # of pi, a number
         except TypeError:
             raise Untraceable(f"arithmetic with a {type(value).__name__}") from None
 
-    def mpf(self, value: Any) -> Any:
-        """See mpmath."""
-        return value if isinstance(value, Swept) else self.plain.mpf(value)
+    mpf = convert
 
     def __getattr__(self, name: str) -> Any:
         found = getattr(self.plain, name)
@@ -334,8 +327,6 @@ class SweptContext:
         def function(*values: Any, **options: Any) -> Any:
             if not any(isinstance(v, Swept) for v in values):
                 return found(*values, **options)
-            if name not in _FUNCTIONS:
-                raise Untraceable(name)
             return self.each(found, *values)
 
         return function

@@ -21,7 +21,7 @@ from rigidsim.scene.exact import ExactNumber, fraction_of
 from rigidsim.scene.paths import Path, leaves
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.scene.schema import config_model
-from rigidsim.scene.starts import RATES
+from rigidsim.scene.starts import from_momentum
 
 ATTITUDE = "initial.attitude"
 _TABLES = ("body", "initial", "loads", "rotors", "parameters", "states", "bodies")
@@ -113,7 +113,7 @@ def _turned(scene: Scene, vector: Sequence[Any]) -> Scene:
     turned = replace(scene, quaternion=list(product(scene.quaternion, turn)), euler_angles=None)
     if scene.config.initial.angular_momentum is None:
         return turned
-    return replace(turned, angular_velocity=RATES["angular_momentum"].resolve(turned))
+    return replace(turned, angular_velocity=from_momentum(turned))
 
 
 # --- from texts to numbers ----------------------------------------------------------------------------------

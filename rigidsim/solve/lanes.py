@@ -142,14 +142,11 @@ class BatchEngine:
         last = len(terms) - 1
         pace = np.maximum(terms[-1] ** (1 / last), terms[-2] ** (1 / (last - 1)))
         order = np.argsort(pace * (times[-1] - start), kind="stable").tolist()
-        # natural steps, the last of which is shortened to end there, in place of a grid of times
-        ends = len(times) <= 2 and bool((times[:-1] == start).all() and (times[-1] > start).all())
-        together = self._to_ends if ends else self._through_samples
         for first in range(0, count, self.width):
             members = order[first : first + self.width]
-            if together(result, members, motions, most_steps) and len(members) > 1:
+            if self._together(result, members, motions, most_steps) and len(members) > 1:
                 for member in members:  # alone, so that it gets as far as possible
-                    together(result, [member], motions, most_steps)
+                    self._together(result, [member], motions, most_steps)
         return result
 
     def longest(self, initial: np.ndarray, parameters: np.ndarray, start: np.ndarray) -> np.ndarray:
@@ -199,59 +196,40 @@ class BatchEngine:
         if self._used:
             self._integrator.pars[:] = parameters[: self._used]
 
-    def _to_ends(self, result: LaneResults, members: list[int], motions: _Motions, most_steps: int) -> bool:
-        """Run one group of which only the ends are wanted; returns whether a state was lost."""
-        initial, parameters, start, times, longest = self._of(motions, members)
-        integrator, count = self._integrator, len(members)
-        self._set(initial, parameters, start)
-        integrator.propagate_until(times[-1], max_steps=most_steps, max_delta_t=longest)
-        outcomes = integrator.propagate_res[:count]
-        lost = np.array([outcome[0] == _LOST for outcome in outcomes])
-        arrived = (np.array(integrator.time) == times[-1])[:count] & ~lost
-        result.states[0][:, members] = initial[:, :count]
-        result.states[-1][:, members] = np.where(arrived, integrator.state[:, :count], np.nan)
-        result.steps[members] = [outcome[3] for outcome in outcomes]
-        self._note(result, members, arrived, lost)
-        return bool(lost.any())
-
-    def _of(self, motions: _Motions, members: list[int]) -> list[np.ndarray]:
-        """The numbers of one group's lanes, those without a member as the first."""
-        lanes = members + [members[0]] * (self.width - len(members))
-        return [numbers[..., lanes] for numbers in motions]
-
-    def _note(self, result: LaneResults, members: list[int], arrived: np.ndarray, lost: np.ndarray) -> None:
-        result.arrived[members], result.finite[members] = arrived, ~lost
-        for place, member in enumerate(members):
-            result.found[member] = [crossing for crossing in self._log if crossing.lane == place]
-
-    def _through_samples(
-        self, result: LaneResults, members: list[int], motions: _Motions, most_steps: int
-    ) -> bool:
+    def _together(self, result: LaneResults, members: list[int], motions: _Motions, most_steps: int) -> bool:
         """Run one group; returns whether a state was lost."""
-        initial, parameters, start, times, longest = self._of(motions, members)
+        lanes = members + [members[0]] * (self.width - len(members))
+        initial, parameters, start, times, longest = (numbers[..., lanes] for numbers in motions)
         integrator, count = self._integrator, len(members)
         self._set(initial, parameters, start)
-        taken = np.zeros(count, dtype=np.int64)
-        arrived, lost = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
-        first, begin, left = 0, start, most_steps
-        while True:
+        taken, whole, lost = (
+            np.zeros(count, dtype=np.int64),
+            np.ones(count, dtype=bool),
+            np.zeros(count, bool),
+        )
+        # natural steps, the last of which is shortened to end there, in place of a grid of times
+        ends = len(times) <= 2 and bool((times[:-1] == start).all() and (times[-1] > start).all())
+        first, begin = 0, start
+        while first < len(times) and whole.all() and taken.max() < most_steps:
             part = times[first : first + _GRID]
-            known = bool(first == 0 and (part[0] == start).all())
-            if known and len(part) == 1:
-                found = np.array(integrator.state)[None]
-            else:
-                grid = part if known else np.vstack([begin, part])
-                _, found = integrator.propagate_grid(grid, max_steps=left, max_delta_t=longest)
+            grid, found = part if (part[0] == begin).all() else np.vstack([begin, part]), initial[None]
+            if len(grid) > 1:
+                options = {"max_steps": most_steps - int(taken.max()), "max_delta_t": longest}
+                if ends:
+                    integrator.propagate_until(grid[-1], **options)
+                    found = np.stack([initial, integrator.state])
+                else:
+                    _, found = integrator.propagate_grid(grid, **options)
                 outcomes = integrator.propagate_res[:count]
                 taken += [now[3] for now in outcomes]
-                arrived[:] = [now[0] == _ARRIVED for now in outcomes]
-                lost[:] = [now[0] == _LOST for now in outcomes]
-            skipped = 0 if known else 1
-            result.states[first : first + len(part), :, members] = found[skipped:, :, :count]
-            first, begin, left = first + _GRID, part[-1], most_steps - int(taken.max())
-            if not arrived.all() or first >= len(times) or left <= 0:
-                break
+                whole, lost = (np.array([now[0] == code for now in outcomes]) for code in (_ARRIVED, _LOST))
+            result.states[first : first + len(part), :, members] = found[-len(part) :, :, :count]
+            first, begin = first + len(part), part[-1]
         result.states[first:, :, members] = np.nan
-        result.steps[members] = taken
-        self._note(result, members, arrived & (first >= len(times)), lost)
+        if ends:
+            result.states[-1][:, np.array(members)[~whole]] = np.nan
+        result.steps[members], result.finite[members] = taken, ~lost
+        result.arrived[members] = whole & (first >= len(times))
+        for place, member in enumerate(members):
+            result.found[member] = [crossing for crossing in self._log if crossing.lane == place]
         return bool(lost.any())

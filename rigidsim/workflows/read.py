@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import rigidsim.model.earth_frames
 import rigidsim.model.loads
 import rigidsim.model.observables.mechanical
 import rigidsim.solve.equilibria  # noqa: F401  (each enters what it defines into a registry of rigidsim.scene)

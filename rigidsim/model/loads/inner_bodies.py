@@ -56,7 +56,7 @@ from rigidsim.scene.expressions.names import NameProvider, Readable, provides
 from rigidsim.scene.expressions.tree import Expression, states_read
 from rigidsim.scene.frame import unique_axis
 from rigidsim.scene.registry import Setting, register_load
-from rigidsim.scene.rotors import Bearing, RotorTable
+from rigidsim.scene.rotors import RotorTable
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.swept import plain
@@ -117,8 +117,9 @@ class Rotor(Load):
         return f"rotor {self.name}"
 
     @property
-    def bearing(self) -> Bearing | None:  # type: ignore[override]
-        return None if self.fixed else (self.moment, self.axis)
+    def apart(self) -> Matrix | None:  # type: ignore[override]
+        """On a bearing, J a a^T: torques on the body don't accelerate it about its axis."""
+        return None if self.fixed else [[self.moment * x * y for y in self.axis] for x in self.axis]
 
     @property
     def inner_momentum(self) -> Vector:  # type: ignore[override]

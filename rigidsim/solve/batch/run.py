@@ -342,11 +342,7 @@ class BatchRun:
 
 def _reached(lanes: LaneResults) -> np.ndarray:
     """Number of samples that each member reached, (members,)."""
-    found = np.full(len(lanes.arrived), len(lanes.states))
-    short = np.flatnonzero(~lanes.arrived)
-    finite = np.isfinite(lanes.states[:, :, short]).all(axis=1)
-    found[short] = np.where(finite.all(axis=0), len(finite), np.argmin(finite, axis=0))
-    return found
+    return np.logical_and.accumulate(np.isfinite(lanes.states).all(axis=1)).sum(axis=0)
 
 
 def _end(block: BatchBlock, member: int, samples: int) -> None:

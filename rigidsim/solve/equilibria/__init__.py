@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.starts import ATTITUDES, EQUILIBRIA, InitialRotation, StartForm, refusal, register_start
+from rigidsim.scene.starts import STARTS, InitialRotation, refusal
 from rigidsim.scene.swept import SweptContext, Untraceable
 from rigidsim.solve.equilibria.cassini import cassini_state
 from rigidsim.solve.equilibria.relative import relative_equilibrium
@@ -42,10 +42,8 @@ def _once(name: str, find: Callable[[Scene], InitialRotation], scene: Scene) -> 
     return InitialRotation(quaternion, rates, found=found.found)
 
 
-def _enter(name: str, find: Callable[[Scene], InitialRotation], allowed: tuple[str, ...]) -> None:
-    register_start(EQUILIBRIA, StartForm("equilibrium", partial(_once, name, find), allowed=allowed), name)
-
-
-_enter("relative", relative_equilibrium, (*ATTITUDES, "prime_meridian", "node_longitude"))
-for _number in (1, 2, 3, 4):
-    _enter(f"cassini_{_number}", partial(cassini_state, number=_number), ("spin_period",))
+_FINDERS = {
+    "relative": relative_equilibrium,
+    **{f"cassini_{number}": partial(cassini_state, number=number) for number in (1, 2, 3, 4)},
+}
+STARTS.update({name: partial(_once, name, find) for name, find in _FINDERS.items()})

@@ -15,13 +15,13 @@ from fractions import Fraction
 from functools import cache
 from typing import Any
 
-import heyoka as hy
 import numpy as np
 
 from rigidsim.scene.epochs import Epoch, leap_seconds, tdb_minus_tt
-from rigidsim.scene.starts import PROPAGATORS, ROTATIONS, Rotation
 from rigidsim.scene.two_line_elements import TwoLineElements
 
+Rotation = tuple[list[list[float]], list[float]]
+"""Matrix from a frame to GCRF, and the frame's angular velocity in GCRF (rad/s)."""
 LONGEST = 30
 """Days from the date of two-line elements: errors of SGP4 grow by 1 to 3 km a day (Vallado et al. 2006)."""
 _WATCHED = 5.0  # minutes between moments at which SGP4 is asked whether there is an orbit, 18 in the lowest
@@ -45,7 +45,9 @@ def package(name: str) -> Any:
 @cache
 def _orientation() -> np.ndarray:
     """Columns: seconds of TAI since MJD 0, UT1 - TAI (s), pole (rad, two), its offsets (rad, two)."""
-    table = np.array([tuple(row) for row in hy.eop_data().table], dtype=float)
+    from heyoka import eop_data  # which few scenes need
+
+    table = np.array([tuple(row) for row in eop_data().table], dtype=float)
     days, offsets, _ = leap_seconds()
     found = np.searchsorted(np.array(days) - _MJD_OF_DAY_0, table[:, 0], side="right") - 1
     tai = np.array(offsets, dtype=float)[found]
@@ -150,7 +152,3 @@ def sgp4(elements: TwoLineElements, epoch: Epoch) -> tuple[list[float], list[flo
         if moment == minutes:
             place, speed = found, moving
     return [1e3 * x for x in place], [1e3 * v for v in speed]
-
-
-ROTATIONS.update({"ITRF": itrf, "TEME": teme})
-PROPAGATORS["SGP4"] = sgp4
