@@ -27,7 +27,7 @@ import numpy as np
 import rigidsim
 from experiments.common import Command
 from rigidsim.solve.problem import prepare
-from rigidsim.workflows.physics.required import size_of
+from rigidsim.workflows.physics import size_of
 
 PARENTS = {
     "planet-degree-3": "planet",

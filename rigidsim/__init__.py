@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rigidsim.workflows.compare.compared import compare
     from rigidsim.workflows.export import export
     from rigidsim.workflows.fit.fitting import fit
-    from rigidsim.workflows.physics.required import required_physics
+    from rigidsim.workflows.physics import required_physics
     from rigidsim.workflows.plan import plan
     from rigidsim.workflows.read import Experiment, load, parse
     from rigidsim.workflows.resume import resume
@@ -42,7 +42,7 @@ _NAMES = {
     "workflows.compare.compared": ("compare",),
     "workflows.export": ("export",),
     "workflows.fit.fitting": ("fit",),
-    "workflows.physics.required": ("required_physics",),
+    "workflows.physics": ("required_physics",),
     "workflows.plan": ("plan",),
     "workflows.read": ("Experiment", "load", "parse"),
     "workflows.resume": ("resume",),

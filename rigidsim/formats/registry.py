@@ -51,7 +51,7 @@ def named_epoch(naming: Naming, attributes: Mapping[str, Any]) -> Epoch:
 @dataclass(frozen=True)
 class TableSource:
     """The run, or the sweep, that a table comes from; ``motion`` is a run's, as of
-    ``rigidsim.workflows.again``, for formats that ask.
+    ``rigidsim.workflows.run``, for formats that ask.
     """
 
     title: str

@@ -302,24 +302,15 @@ def _known(attributes: dict[str, Any]) -> dict[str, Any]:
 
 def kernel_attributes(scene: Scene) -> dict[str, Any]:
     """Identifies the kernels of a scene: names, span of what was read, and SHA-256; empty without one."""
-    return _of_ephemeris(scene) | _of_orientation(scene)
-
-
-def _of_orientation(scene: Scene) -> dict[str, Any]:
-    found = scene.orientation
-    if found is None:
-        return {}
-    names = {"orientation_kernel": found.name, "orientation_of": found.described}
-    return {**names, "orientation_sha256": found.digest}
-
-
-def _of_ephemeris(scene: Scene) -> dict[str, Any]:
-    if scene.ephemeris is None or not scene.ephemeris.used:
-        return {}
-    first, last = zip(*(sight.span for sight in scene.ephemeris.used), strict=True)
-    span = f"{date_of(max(first))} to {date_of(min(last))} TDB"
-    kernel = scene.ephemeris.kernel
-    return {"ephemeris_kernel": kernel.name, "ephemeris_span": span, "ephemeris_sha256": kernel.digest}
+    found: dict[str, Any] = {}
+    if scene.ephemeris is not None and scene.ephemeris.used:
+        first, last = zip(*(sight.span for sight in scene.ephemeris.used), strict=True)
+        span, kernel = f"{date_of(max(first))} to {date_of(min(last))} TDB", scene.ephemeris.kernel
+        found = {"ephemeris_kernel": kernel.name, "ephemeris_span": span, "ephemeris_sha256": kernel.digest}
+    if (turning := scene.orientation) is not None:
+        found |= {"orientation_kernel": turning.name, "orientation_of": turning.described}
+        found["orientation_sha256"] = turning.digest
+    return found
 
 
 def _recorded(prepared: InitialValueProblem) -> dict[str, Any]:

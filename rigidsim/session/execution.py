@@ -30,11 +30,10 @@ from rigidsim.session.session import (
     Interruption,
     Observer,
     Recorder,
-    RunCost,
     SampleStatistics,
     Session,
 )
-from rigidsim.session.understood import body_of, cautions_of, load_descriptions, span_of, start_of, time_words
+from rigidsim.session.understood import cautions_of, time_words, understood
 from rigidsim.solve.assembly import Assembly, assemble
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.effects.charts import Charts
@@ -467,10 +466,7 @@ def summarise(run: "_ActiveRun", found: Diagnostics, spectrum: LyapunovSpectrum 
         modelling=_modelling(found),
         tables=_tables(found),
         lyapunov=_lyapunov(found, spectrum),
-        body=body_of(scene),
-        start=start_of(scene),
-        time=span_of(scene),
-        loads=load_descriptions(prepared, sizes=False),
+        **understood(prepared, sizes=False),
         bit_for_bit=_bit_for_bit(prepared, progress, run.attributes.get("mixed_provenance")),
         provenance=repeated(run.attributes),
         events={c.name: len(log.occurrences(i, run.last_time)) for i, c in enumerate(system.events)},
@@ -619,14 +615,14 @@ class _ActiveRun:
         system, progress = prepared.system, Progress(prepared.clock.count)
         statistics = SampleStatistics([i.name for i in system.invariants], [r.name for r in system.recorded])
         trail = SampleTrail(prepared.precision)
-        cost = RunCost(session.watch, progress)
+        session.watch.progress = progress
         beside = None
         if prepared.sensitivity_keys:
             from rigidsim.session.sensitivity import Sensitivity  # which few runs need
 
             beside = Sensitivity(prepared)
         more = {} if beside is None else {"sensitivity": beside}
-        self.checkpoints = Checkpoints(parts, statistics=statistics, cost=cost, trail=trail, **more)
+        self.checkpoints = Checkpoints(parts, statistics=statistics, cost=session.watch, trail=trail, **more)
         start = None if chain is None else self.checkpoints.restore(chain)
         self._run_id = os.urandom(8).hex() if chain is None else chain.run
         self.attributes = dataset.root_attributes(prepared, parts, self._run_id, session.mixed)

@@ -401,9 +401,14 @@ NOT_KEPT = "attempts_not_kept"
 
 
 class Stopwatch:
-    """Wall and CPU seconds (of all threads) of a run: of all sessions, and of this one by phase."""
+    """Wall and CPU seconds (of all threads) of a run: of all sessions, and of this one by phase. A part of
+    checkpoints, with what else the run has cost, once ``progress`` is given.
+    """
+
+    version: ClassVar[int] = 1
 
     def __init__(self) -> None:
+        self.progress = Progress(0)
         self.sessions = 1
         self.before = np.zeros(2)  # of earlier sessions
         self.phases: dict[str, np.ndarray] = {}
@@ -438,34 +443,25 @@ class Stopwatch:
             "sessions": self.sessions,
         }
 
-
-def _now() -> np.ndarray:
-    return np.array([time.perf_counter(), time.process_time()])
-
-
-@dataclass
-class RunCost:
-    """What a run has cost in all of its sessions, as a part of checkpoints."""
-
-    watch: Stopwatch
-    progress: Progress
-    version: ClassVar[int] = 1
-
     def pack(self) -> Arrays:
-        watch, progress = self.watch, self.progress
+        progress = self.progress
         return {
             "steps_seen": np.array([progress.smallest_step, progress.largest_step]),
-            "effort": np.append(watch.spent, progress.integration_seconds),
-            "sessions": np.array([watch.sessions, progress.redone_steps], dtype=np.int64),
+            "effort": np.append(self.spent, progress.integration_seconds),
+            "sessions": np.array([self.sessions, progress.redone_steps], dtype=np.int64),
         }
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        watch, progress = self.watch, self.progress
+        progress = self.progress
         progress.smallest_step, progress.largest_step = numbers(arrays, "steps_seen", 2)
         wall, cpu, progress.integration_seconds = numbers(arrays, "effort", 3)
-        watch.before = np.array([wall, cpu])
+        self.before = np.array([wall, cpu])
         sessions, redone = numbers(arrays, "sessions", 2)
-        watch.sessions, progress.redone_steps = int(sessions) + 1, int(redone)
+        self.sessions, progress.redone_steps = int(sessions) + 1, int(redone)
+
+
+def _now() -> np.ndarray:
+    return np.array([time.perf_counter(), time.process_time()])
 
 
 @dataclass

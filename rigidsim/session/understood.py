@@ -77,6 +77,13 @@ def span_of(scene: Scene) -> Span:
     )
 
 
+def understood(prepared: InitialValueProblem, *, sizes: bool = True) -> dict[str, Any]:
+    """Fields of ``Understood`` but for the warnings; ``sizes`` as for ``load_descriptions``."""
+    scene = prepared.scene
+    loads = load_descriptions(prepared, sizes=sizes)
+    return {"body": body_of(scene), "start": start_of(scene), "time": span_of(scene), "loads": loads}
+
+
 def load_descriptions(prepared: InitialValueProblem, *, sizes: bool = True) -> tuple[str, ...]:
     """The loads and user-defined states, one sentence for each: keys, and torque and force at the start.
 
@@ -177,44 +184,41 @@ def cautions_of(scene: Scene) -> list[Caution]:
     for load in loads_of(scene):
         if isinstance(load, tuple(LOADS["body"].values())):
             found += load.cautions(scene.config.body, "[body]", scene)
-    named, host = [getattr(fields, "source", None) for fields in scene.config.loads], scene.host
-    if (
-        host
-        and host not in named
-        and any(isinstance(load.placement, FlownByKernel) for load in scene.given_loads)
-    ):
-        text = (
-            f'[body] host: given "{host}", whose own gravity no load has, so that only what others do to it '
-        )
-        text += f'acts; add central_gravity with source = "{host}", unless that is meant'
-        found.append(Caution(WarningCode.HOST_WITHOUT_GRAVITY, text))
-    if scene.gravity is not None and not scene.free_flight and scene.torque_arm is None:
-        found.append(
-            Caution(
-                WarningCode.NO_EFFECT,
-                "uniform_gravity has no effect, since the body turns about its centre of mass; give [body] "
-                "reference or center_of_mass for a top, or [initial] position for free flight",
-            )
-        )
-    given = scene.config.body.gravity_field is not None and scene.config.body.preset is None
-    if given and all(getattr(load, "degree", None) is None for load in scene.config.loads):
-        what = "[body] gravity_field has no effect, since no load has degree; give a gravity_gradient or "
-        found.append(Caution(WarningCode.NO_EFFECT, what + "central_gravity the degree that it feels"))
+    config, body, host = scene.config, scene.config.body, scene.host
+    named = [getattr(fields, "source", None) for fields in config.loads]
+    flies = bool(host) and any(isinstance(load.placement, FlownByKernel) for load in scene.given_loads)
+    given = body.gravity_field is not None and body.preset is None
+    felt = any(getattr(load, "degree", None) is not None for load in config.loads)
+    seen = any(getattr(load, "ephemeris", None) for load in config.loads)
     wasted = _wasted_tolerance(scene)
-    if wasted:
-        found.append(Caution(WarningCode.NO_EFFECT, wasted))
-    preset = scene.config.body.preset
-    if preset not in (None, "earth", "earth_rigid") and any(
-        getattr(load, "ephemeris", None) for load in scene.config.loads
-    ):
-        found.append(
-            Caution(
-                WarningCode.EPHEMERIS_OF_EARTH,
-                "the ephemerides give Sun and Moon as seen from the Earth, while the body is "
-                f"{preset}; give gravity_gradient the orbit of its source instead",
-            )
-        )
-    return found
+    suspicious = [
+        (
+            flies and host not in named,
+            WarningCode.HOST_WITHOUT_GRAVITY,
+            f'[body] host: given "{host}", whose own gravity no load has, so that only what others do to it '
+            f'acts; add central_gravity with source = "{host}", unless that is meant',
+        ),
+        (
+            scene.gravity is not None and not scene.free_flight and scene.torque_arm is None,
+            WarningCode.NO_EFFECT,
+            "uniform_gravity has no effect, since the body turns about its centre of mass; give [body] "
+            "reference or center_of_mass for a top, or [initial] position for free flight",
+        ),
+        (
+            given and not felt,
+            WarningCode.NO_EFFECT,
+            "[body] gravity_field has no effect, since no load has degree; give a gravity_gradient or "
+            "central_gravity the degree that it feels",
+        ),
+        (wasted, WarningCode.NO_EFFECT, wasted),
+        (
+            seen and body.preset not in (None, "earth", "earth_rigid"),
+            WarningCode.EPHEMERIS_OF_EARTH,
+            "the ephemerides give Sun and Moon as seen from the Earth, while the body is "
+            f"{body.preset}; give gravity_gradient the orbit of its source instead",
+        ),
+    ]
+    return found + [Caution(code, text) for holds, code, text in suspicious if holds]
 
 
 def _wasted_tolerance(scene: Scene) -> str:

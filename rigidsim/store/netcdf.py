@@ -63,20 +63,14 @@ class NetcdfFile:
         filters = {} if gzip is None else {"compression": "gzip", "compression_opts": gzip, "shuffle": True}
         return self._created(name, dims, "<i8" if whole else "<f8", attributes, chunks=chunk, **filters)
 
-    def texts(self, name: str, dim: str, texts: Sequence[str], attributes: Mapping[str, Any]) -> None:
-        """Write strings along a dimension, of which they may be the labels."""
-        self.dimension(dim, len(texts))
-        kind = h5py.string_dtype()
-        self._created(name, (dim,), kind, attributes)[...] = np.array(texts, dtype=kind)
-
-    def labels(self, dim: str, labels: Sequence[str]) -> None:
-        """Write a dimension's labels, unless they are there."""
-        self.texts_once(dim, dim, labels)
-
-    def texts_once(self, name: str, dim: str, texts: Sequence[str]) -> None:
-        """Write strings along a dimension, unless they are there."""
+    def texts(
+        self, name: str, texts: Sequence[str], dim: str = "", attributes: Mapping[str, Any] | None = None
+    ) -> None:
+        """Write strings, unless they are there, along a dimension: by default the one that they label."""
         if name not in self._labelled.variables:
-            self.texts(name, dim, texts, label_attributes(name))
+            self.dimension(dim or name, len(texts))
+            kind, about = h5py.string_dtype(), label_attributes(name) if attributes is None else attributes
+            self._created(name, (dim or name,), kind, about)[...] = np.array(texts, dtype=kind)
 
     def _created(
         self, name: str, dims: Sequence[str], dtype: Any, attributes: Mapping[str, Any], **how: Any
@@ -184,7 +178,7 @@ def declare(
     file.attributes(attributes)
     file.dimension("time", rows)
     for dim, labels in used_labels(variables).items():
-        file.labels(dim, labels)
+        file.texts(dim, labels)
     chunk, gzip = ((min(CHUNK_ROWS, rows),), GZIP_LEVEL) if compressed and rows else (None, None)
     return {
         name: file.variable(

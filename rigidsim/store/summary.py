@@ -368,22 +368,35 @@ class Brief(SummaryPart):
         return None
 
 
-class Summary(Brief):
+class Understood(SummaryPart):
+    """How a config was understood, and what in it is suspicious.
+
+    Attributes:
+        body, start, time: None where the config can't be run, or an older version didn't say.
+        loads: what acts on the body, in a reader's terms.
+        warnings, warning_codes: texts, and a ``WarningCode`` for each.
+    """
+
+    body: UnderstoodBody | None = None
+    start: Start | None = None
+    time: Span | None = None
+    loads: tuple[Text, ...] = ()
+    warnings: tuple[Text, ...] = ()
+    warning_codes: tuple[Text, ...] = ()
+
+
+class Summary(Brief, Understood):
     """Summary of a run that ended.
 
     Attributes:
-        warnings, warning_codes: texts, and a ``WarningCode`` for each.
         time_reached: time of the last sample, or of the event that ended the run, s.
         engine_time: time that the integration reached, s; its own steps go past the last sample.
         unwatched: invariants of the scene that weren't monitored, and why.
-        loads: what acts on the body, in a reader's terms.
         advice: settings that would do better at about the same cost, the best last.
         undefined_samples: number of NaN samples of each recorded variable that has any.
         dataset_sha256, timeline_sha256: SHA-256 of the files, once there are any.
     """
 
-    warnings: tuple[Text, ...]
-    warning_codes: tuple[Text, ...] = ()
     samples: StrictInt
     samples_planned: StrictInt
     time_reached: FiniteNumber
@@ -402,10 +415,6 @@ class Summary(Brief):
     modelling: Modelling | None = None
     tables: dict[Text, TableErrors] = Field(default_factory=dict)
     lyapunov: Lyapunov | None = None
-    body: UnderstoodBody
-    start: Start | None = None
-    time: Span | None = None
-    loads: tuple[Text, ...] = ()
     bit_for_bit: BitForBit
     provenance: dict[Text, StrictStr | StrictInt]
     events: dict[Text, StrictInt] = Field(default_factory=dict)

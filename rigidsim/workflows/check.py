@@ -8,15 +8,15 @@ from rigidsim.accuracy.choice import fully
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.sweep import Sweep
 from rigidsim.session.dataset import refuse_taken_names
-from rigidsim.session.understood import body_of, cautions_of, load_descriptions, span_of, start_of
+from rigidsim.session.understood import cautions_of, understood
 from rigidsim.solve.problem import prepare
-from rigidsim.store.summary import Span, Start, SummaryPart, UnderstoodBody, as_fields
+from rigidsim.store.summary import Understood, as_fields
 from rigidsim.workflows.read import load
 from rigidsim.workflows.sweeps.members import recording
 from rigidsim.workflows.sweeps.plan import QUICK, check_sweep
 
 
-class Checked(SummaryPart):
+class Checked(Understood):
     """Result of a check: problems, warnings, and how a config that can be run was understood; ``as_dict``
     gives what ``--json`` prints.
     """
@@ -24,12 +24,6 @@ class Checked(SummaryPart):
     source: str
     valid: bool
     problems: list[Problem]
-    warnings: list[str]
-    warning_codes: list[str]
-    body: UnderstoodBody | None
-    start: Start | None
-    time: Span | None
-    loads: list[str]
 
 
 def check(path: str | Path, *, overrides: Sequence[str] = ()) -> Checked:
@@ -46,16 +40,9 @@ def check(path: str | Path, *, overrides: Sequence[str] = ()) -> Checked:
         unknown: dict[str, Any] = dict.fromkeys(("body", "start", "time"))
         given = error.source or str(path)
         return Checked(
-            source=given, valid=False, problems=error.problems, **as_fields([]), **unknown, loads=[]
+            source=given, valid=False, problems=error.problems, **as_fields([]), **unknown, loads=()
         )
-    scene = prepared.scene
     return Checked(
-        source=str(path),
-        valid=True,
-        problems=[],
-        **as_fields(cautions_of(scene)),
-        body=body_of(scene),
-        start=start_of(scene),
-        time=span_of(scene),
-        loads=list(load_descriptions(prepared)),
-    )
+        source=str(path), valid=True, problems=[], **as_fields(cautions_of(prepared.scene)),
+        **understood(prepared),
+    )  # fmt: skip

@@ -16,8 +16,8 @@ from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.store.outputs import FILE, refuse_loss, writing
 from rigidsim.store.run import SavedRun
 from rigidsim.store.sweeps.saved import SavedSweep, open_saved
-from rigidsim.workflows.again import MotionAgain
 from rigidsim.workflows.read import parse
+from rigidsim.workflows.run import MotionAgain
 
 _PART_BITS = 53  # bits of a double: a value held by n of them has at most n times as many
 

@@ -3,31 +3,110 @@
 import math
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rigidsim.accuracy.choice import choose_level, chosen
-from rigidsim.accuracy.error_law import (
-    closed_form_if_any,
-    held_error,
-    stable_law,
-)
-from rigidsim.accuracy.motion import growth_of
+from rigidsim.accuracy.choice import CHEAPEST_FIRST, LevelChoice, choose_level, chosen
+from rigidsim.accuracy.error_law import closed_form_if_any, held_error, stable_law
+from rigidsim.accuracy.modelling import Unmeasured, measure_modelling
+from rigidsim.accuracy.motion import Pilot, growth_of, run_pilot
+from rigidsim.errors import ConfigError
+from rigidsim.model.averaged.average import reads_rates_alone
 from rigidsim.model.equation_text import equation_texts
 from rigidsim.model.load import Load
+from rigidsim.scene.choices import FULL
+from rigidsim.scene.config import Experiment
 from rigidsim.session.dataset import dataset_variables, refuse_taken_names, unused_variables
 from rigidsim.session.session import storage
-from rigidsim.session.understood import body_of, cautions_of, load_descriptions, span_of, start_of
+from rigidsim.session.understood import cautions_of, understood
 from rigidsim.solve.assembly import Assembly, assemble
+from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.projection import LATE
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.store.segments import SegmentLimits
-from rigidsim.store.summary import Span, Start, SummaryPart, UnderstoodBody
-from rigidsim.workflows.plan_levels import LevelCost, compared_levels, timed_pilot, torques_change_pace
+from rigidsim.store.summary import SummaryPart, Understood
 from rigidsim.workflows.read import Given, as_experiment
+
+_LEVEL_SECONDS = 0.2
+_LARGEST_CHUNK = 1024  # steps: at this length a call's overhead is negligible
+
+
+class LevelCost(SummaryPart):
+    """What a level of ``[model]`` would cost, from a short pilot, and leave out: the modelling error of axes,
+    forecast from the beginning, and the CPU time of measuring it after a run; why it isn't chosen, empty for
+    the one that is. None where something isn't known, or there is no such average.
+    """
+
+    level: str
+    error_rad: float | None
+    steps: float | None
+    cpu_seconds: float | None
+    modelling_seconds: float | None
+    why_not: str
+
+
+def compared_levels(
+    experiment: Experiment, choice: LevelChoice | None, loads: Sequence[Load] = ()
+) -> list[LevelCost]:
+    """All levels, the cheapest first, if the config says anything about models; a choice isn't measured
+    again.
+    """
+    if "model" not in experiment.config.model_fields_set:
+        return []
+    asked = choice.level if choice else experiment.config.model.level
+    looked_at = {row.level: row for row in choice.considered} if choice else {}
+    found = []
+    for level in (*CHEAPEST_FIRST, FULL):
+        unknown = dict.fromkeys(("error_rad", "steps", "cpu_seconds", "modelling_seconds"))
+        row: dict[str, Any] = {"level": level, **unknown}
+        known = looked_at.get(level)
+        try:
+            prepared = prepare(experiment.having([f'model.level="{level}"']), loads=loads)
+        except ConfigError as error:
+            found.append(LevelCost(**row, why_not="; ".join(problem.what for problem in error.problems)))
+            continue
+        pilot = timed_pilot(prepared, assemble(prepared).steps(), _LEVEL_SECONDS)
+        steps = math.ceil(pilot.whole)
+        row |= {"steps": float(steps), "cpu_seconds": steps * pilot.seconds_per_step}
+        if level == FULL:
+            row["error_rad"] = 0.0
+        elif known is not None:
+            row |= {"error_rad": known.error, "modelling_seconds": known.seconds}
+        else:
+            with suppress(Unmeasured):
+                measured = measure_modelling(prepared)
+                row |= {"error_rad": measured.worst, "modelling_seconds": measured.seconds_of_run}
+        why = known.why_not if known is not None else "" if level == asked else "another level is cheaper"
+        found.append(LevelCost(**row, why_not=why if choice or level == asked else "not asked for"))
+    return found
+
+
+def timed_pilot(prepared: InitialValueProblem, corrected: CorrectedStepper, seconds: float) -> Pilot:
+    """The first steps of a motion, corrections included, within so many CPU seconds."""
+    return run_pilot(
+        corrected.stepper,
+        prepared.clock,
+        corrected.skip,
+        seconds=seconds,
+        chunk=1,
+        largest_chunk=_LARGEST_CHUNK,
+    )
+
+
+def torques_change_pace(prepared: InitialValueProblem, pilot: Pilot) -> bool:
+    """Whether steps get longer or shorter after the pilot's, since torques that are functions of the rates
+    brake the rotation, or spin it up.
+    """
+    plan, clock = prepared.system.plan, prepared.clock
+    alone = [load for load in plan.loads if load.gradient_source is None]
+    braked = plan.formulation.resolves_rotation and alone and all(map(reads_rates_alone, alone))
+    ahead = pilot.taken * pilot.step < float(clock.at(clock.count - 1)) - float(clock.start)
+    return bool(prepared.has_steps and braked and ahead)
+
 
 _PILOT_SECONDS = 0.5
 _BASE_MEMORY = 170e6  # interpreter, libraries and compiled code
@@ -113,7 +192,7 @@ class Predicted(SummaryPart):
     growth_seconds: float | None
 
 
-class RunPlan(SummaryPart):
+class RunPlan(Understood):
     """What would be integrated and why, and what it would cost; ``as_dict`` gives what ``--json`` prints.
 
     Attributes:
@@ -131,7 +210,6 @@ class RunPlan(SummaryPart):
     euler_partner_sequence: str | None
     states: list[str]
     state_count: int
-    loads: list[str]
     reasons: list[StatesWhy]
     left_out: list[LeftOut]
     switching: list[PlannedSurface]
@@ -153,11 +231,6 @@ class RunPlan(SummaryPart):
     taylor_order: int | None
     pilot: PilotCosts
     predicted: Predicted
-    warnings: list[str]
-    warning_codes: list[str]
-    body: UnderstoodBody
-    start: Start
-    time: Span
 
     def __repr__(self) -> str:
         cost = self.predicted
@@ -235,7 +308,6 @@ def plan(
         euler_partner_sequence=None if system.partner is None else system.partner.sequence,
         states=list(system.states),
         state_count=len(system.states),
-        loads=list(load_descriptions(prepared)),
         reasons=[StatesWhy(states=states, why=why) for states, why in system.reasons],
         left_out=[LeftOut(what=what, why=why) for what, why in system.left_out],
         switching=[PlannedSurface(surface=s.text, where=s.where) for s in system.plan.surfaces.found],
@@ -287,11 +359,9 @@ def plan(
             amplification=amplification,
             growth_seconds=growth.seconds,
         ),
-        warnings=[text for _, text in warnings],
-        warning_codes=[code for code, _ in warnings],
-        body=body_of(prepared.scene),
-        start=start_of(prepared.scene),
-        time=span_of(prepared.scene),
+        warnings=tuple(text for _, text in warnings),
+        warning_codes=tuple(code for code, _ in warnings),
+        **understood(prepared),
     )
 
 

@@ -219,20 +219,14 @@ def _continued(experiment: Experiment, last: Path) -> Experiment:
     ends: list[str] = []
     if experiment.text != begun.text:
         ends = assignments(experiment.text, ["time.end", "time.samples"])
-        if not ends or not _prolongs(experiment, begun, ends):
+        longer = ends and begun.having(ends).text == experiment.text
+        if not longer or build_scene(experiment).samples.count <= build_scene(begun).samples.count:
             raise RunFolderError(
                 f"{experiment.source}: was changed since the run began "
                 f"({text_difference(experiment.text, begun.text)}); "
                 "put it back (the segments hold it as their attribute config), or begin a new run"
             )
     return replace(experiment, given=begun.given, settings=(*begun.settings, *ends))
-
-
-def _prolongs(experiment: Experiment, begun: Experiment, ends: Sequence[str]) -> bool:
-    """Whether the experiment is the one that was begun, except for a later end."""
-    if begun.having(ends).text != experiment.text:
-        return False
-    return build_scene(experiment).samples.count > build_scene(begun).samples.count
 
 
 def _compared(prepared: InitialValueProblem, chain: Chain) -> str:

@@ -21,7 +21,7 @@ from rigidsim.scene.choices import FULL
 from rigidsim.scene.config import Experiment
 from rigidsim.store.outputs import refuse_loss, writing
 from rigidsim.workflows.compare.compared import Comparison, compare
-from rigidsim.workflows.plan_levels import compared_levels
+from rigidsim.workflows.plan import compared_levels
 from rigidsim.workflows.read import Given, as_experiment
 
 if TYPE_CHECKING:

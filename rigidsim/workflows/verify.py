@@ -23,9 +23,8 @@ from rigidsim.store.provenance import SETTING, changed, platform_of, read_attrib
 from rigidsim.store.reader import open_dataset
 from rigidsim.store.seal import check_seal
 from rigidsim.store.summary import Brief, Summary
-from rigidsim.workflows.again import experiment_again
 from rigidsim.workflows.read import load, text_difference
-from rigidsim.workflows.run import run
+from rigidsim.workflows.run import experiment_again, run
 
 MEMBERS = 100
 """Number of members of a sweep that are run again by default."""
@@ -295,8 +294,8 @@ def _unconfirmed(
 
 def _verified_sweep(folder: SweepFolder, members: int, seed: int | None) -> Verdict:
     from rigidsim.store.sweeps.saved import open_sweep  # which single runs don't need
-    from rigidsim.workflows.sweeps.executors import results_of
     from rigidsim.workflows.sweeps.members import refuse_other_kernel, sweep_of
+    from rigidsim.workflows.sweeps.sweep import results_of
 
     if members < 1:
         raise ConfigError(Problem("--members", f"given {members}; one or more are allowed"))

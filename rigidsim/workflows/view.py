@@ -16,8 +16,7 @@ from rigidsim.store.pictures import FrameProgress
 from rigidsim.store.run import Run, SavedRun, open_run
 from rigidsim.store.sweeps.saved import open_sweep
 from rigidsim.workflows.compare.as_run import open_any
-from rigidsim.workflows.fit.fitting import read_dataset
-from rigidsim.workflows.fit.result import fitted_run
+from rigidsim.workflows.fit.fitting import fitted_run, read_dataset
 from rigidsim.workflows.read import load, parse
 from rigidsim.workflows.run import run
 from rigidsim.workflows.sweeps.members import single_member

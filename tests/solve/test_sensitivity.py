@@ -9,7 +9,7 @@ from rigidsim import ConfigError
 from rigidsim.scene.rotations import rotation_matrix
 from rigidsim.solve.problem import prepare
 from rigidsim.workflows.read import parse
-from rigidsim.workflows.sensitivity import sensitivities
+from rigidsim.workflows.sensitivity import Tangents
 
 FREE = """
 name = "free"
@@ -33,23 +33,23 @@ def test_a_free_bodys_derivatives_obey_its_scaling_laws() -> None:
     Larger moments, all in proportion, change nothing. A turned start turns the whole motion.
     """
     times = np.linspace(0, 30, 13)
-    found = sensitivities(
-        parse(FREE), ["initial.angular_velocity", "body.principal_moments", "initial.attitude"], times
-    )
+    keys = ["initial.angular_velocity", "body.principal_moments", "initial.attitude"]
+    found = Tangents(parse(FREE), keys).at({}, times)
+    of_attitude, of_rates = found.slopes["quaternion"], found.slopes["angular_velocity"]
     start, moments = np.array([0.3, 1.0, 0.05]), np.array([1, 2, 2.5])
-    w = found.angular_velocity
-    matrix = np.moveaxis(np.array(rotation_matrix([*found.attitude.T])), 2, 0)
+    w = found.values["angular_velocity"]
+    matrix = np.moveaxis(np.array(rotation_matrix([*found.values["quaternion"].T])), 2, 0)
     in_space = np.einsum("nij,nj->ni", matrix, w)
-    size = np.abs(found.d_attitude[:, :6]).max()
-    by_scale = np.einsum("nki,k->ni", found.d_attitude[:, :3], start)
+    size = np.abs(of_attitude[:, :6]).max()
+    by_scale = np.einsum("nki,k->ni", of_attitude[:, :3], start)
     assert np.abs(by_scale - times[:, None] * in_space).max() < ROUNDING * size
     pull = -np.cross(w, w * moments) / moments  # Euler's equations
-    by_scale = np.einsum("nki,k->ni", found.d_angular_velocity[:, :3], start)
+    by_scale = np.einsum("nki,k->ni", of_rates[:, :3], start)
     assert np.abs(by_scale - w - times[:, None] * pull).max() < ROUNDING * size
-    for slopes in (found.d_attitude, found.d_angular_velocity):
+    for slopes in (of_attitude, of_rates):
         assert np.abs(np.einsum("nki,k->ni", slopes[:, 3:6], moments)).max() < ROUNDING * size
-    assert np.abs(found.d_angular_velocity[:, 6:]).max() == 0
-    turned = np.einsum("ij,nkj->nki", matrix[0].T, found.d_attitude[:, 6:])
+    assert np.abs(of_rates[:, 6:]).max() == 0
+    turned = np.einsum("ij,nkj->nki", matrix[0].T, of_attitude[:, 6:])
     assert np.abs(turned - np.eye(3)).max() < ROUNDING
 
 
@@ -78,9 +78,10 @@ def test_the_motions_bits_are_those_of_the_plain_run(integrator: str) -> None:
     assert list(beside["parameter"].values[:4]) == [
         *(f"initial.angular_velocity[{i}]" for i in range(3)), "body.principal_moments[0]",
     ]  # fmt: skip
-    alone = sensitivities(parse(text), [str(key) for key in beside["parameter"].values], plain["time"].values)
-    size = np.abs(alone.d_attitude).max()
-    assert np.abs(beside["attitude_sensitivity"].values - alone.d_attitude).max() < 10 * ROUNDING * size
+    keys = [str(key) for key in beside["parameter"].values]
+    alone = Tangents(parse(text), keys).at({}, plain["time"].values).slopes["quaternion"]
+    apart = np.abs(beside["attitude_sensitivity"].values - alone).max()
+    assert apart < 10 * ROUNDING * np.abs(alone).max()
 
 
 @pytest.mark.parametrize(

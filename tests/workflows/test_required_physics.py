@@ -14,8 +14,7 @@ from typer.testing import CliRunner
 
 import rigidsim
 from rigidsim.cli.app import app
-from rigidsim.workflows.physics.effects import effects_of, settings_without
-from rigidsim.workflows.physics.required import ARCSEC
+from rigidsim.workflows.physics import ARCSEC, effects_of, settings_without
 
 SCENE = """
 name = "satellite"

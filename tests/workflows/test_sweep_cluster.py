@@ -9,8 +9,7 @@ import pytest
 from support import config
 
 from rigidsim import RigidsimError, parse, sweep
-from rigidsim.workflows.sweeps.executors import cluster
-from rigidsim.workflows.sweeps.sweep import SweepObserver
+from rigidsim.workflows.sweeps.sweep import SweepObserver, cluster
 
 distributed = pytest.importorskip("distributed")
 

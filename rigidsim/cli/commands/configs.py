@@ -1,5 +1,6 @@
 """Commands on configs: ``new``, ``check``, ``plan``, ``tradeoff``, ``schema``."""
 
+import sys
 from pathlib import Path
 
 import rigidsim.workflows.check as validation
@@ -7,14 +8,13 @@ import rigidsim.workflows.plan as planning
 import rigidsim.workflows.tradeoff as measuring
 from rigidsim.cli.exits import refuse_options
 from rigidsim.cli.screens.page import Page, Styled, answer, print_json, reporting
-from rigidsim.cli.screens.physics import print_physics
-from rigidsim.cli.screens.plan import print_plan, print_tradeoff
-from rigidsim.cli.screens.summary import print_checked
+from rigidsim.cli.screens.plan import print_physics, print_plan, print_tradeoff
+from rigidsim.cli.screens.summary import print_understood
 from rigidsim.cli.screens.sweeps import print_sweep_plan
-from rigidsim.errors import RigidsimError
+from rigidsim.errors import ConfigError, RigidsimError
 from rigidsim.scene.editor_schema import editor_schema
 from rigidsim.scene.sweep import Sweep
-from rigidsim.workflows.physics.required import required_physics
+from rigidsim.workflows.physics import required_physics
 from rigidsim.workflows.read import load
 from rigidsim.workflows.ready_scenes import by_subject, write_new
 from rigidsim.workflows.sweeps.plan import plan_sweep
@@ -46,8 +46,19 @@ def check(configs: list[Path], overrides: list[str] | None, as_json: bool) -> in
     for path in configs:
         found = validation.check(path, overrides=overrides or [])
         valid = valid and found.valid
-        answer(as_json, found.as_dict(), print_checked, found)
+        answer(as_json, found.as_dict(), _print_checked, found)
     return 0 if valid else 2
+
+
+def _print_checked(found: validation.Checked) -> None:
+    """Print the result of a check; errors go to stderr, as for all commands."""
+    if not found.valid:
+        print(f"rigidsim: {ConfigError(found.problems, found.source)}", file=sys.stderr)
+        return
+    on = Page()
+    on.say((found.source, "bold"), "  ", ("valid", "bold green"))
+    print_understood(found, found.loads, on)
+    on.lines("warning", found.warnings, "bold red")
 
 
 def plan(

@@ -6,7 +6,7 @@ from rigidsim.cli.screens.fit import print_fit
 from rigidsim.cli.screens.page import answer, reporting
 from rigidsim.store.outputs import refuse_loss, writing
 from rigidsim.workflows.fit import fitting
-from rigidsim.workflows.fit.result import FitResult
+from rigidsim.workflows.fit.fitting import FitResult
 from rigidsim.workflows.read import load
 
 

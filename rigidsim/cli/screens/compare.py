@@ -68,8 +68,7 @@ def print_comparison(found: Comparison) -> None:
     if found.first_disagreement is not None:
         first = found.first_disagreement
         on.line("first", f"beyond {_angle(found.within)} at {first.time:.6g} s, {first.row}")
-    for text in found.told:
-        on.line("note", text)
+    on.lines("note", found.told)
     for label, name in (
         ("dataset", found.dataset_file),
         ("figure", found.figure_file),

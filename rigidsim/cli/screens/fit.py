@@ -6,7 +6,7 @@ import math
 
 from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.scene.readable import span_text
-from rigidsim.workflows.fit.result import FitResult, FittedData, digits_text
+from rigidsim.workflows.fit.fitting import FitResult, FittedData, digits_text
 
 _MOST_OUTLIERS = 10
 _CLOSE = 0.95  # correlations from which on two parameters are named together
@@ -26,8 +26,7 @@ def print_fit(found: FitResult) -> None:
         value = digits_text(one.value, one.sigma or 0.0) if one.sigma else f"{one.value:.6g}"
         rows.append([one.key, value, sigma, scaled, f"{one.start:.6g}", "" if one.unit == "1" else one.unit])
     on.table(["parameter", "value", "sigma", "scaled", "start", ""], rows)
-    for unknown in found.undetermined:
-        on.line("unknown", unknown.text, "bold yellow")
+    on.lines("unknown", (unknown.text for unknown in found.undetermined), "bold yellow")
     _tell_correlations(on, found)
     for effect in found.considered:
         on.line("consider", f"{effect.key} = {effect.value:.6g} +- {effect.sigma:.2g}, not estimated")
@@ -37,8 +36,7 @@ def print_fit(found: FitResult) -> None:
         on.line("left out", f"{place}: {outlier.observable}, {outlier.sigmas:.3g} sigmas")
     if len(found.outliers) > _MOST_OUTLIERS:
         on.line("", f"and {len(found.outliers) - _MOST_OUTLIERS} more")
-    for text in found.told:
-        on.line("note", text)
+    on.lines("note", found.told)
     if found.derivatives != "variational equations":
         on.line("note", f"derivatives by {found.derivatives}")
     if found.folder:

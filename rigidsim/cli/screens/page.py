@@ -46,6 +46,11 @@ class Page:
             self.console.print(Text.assemble((f"{label:{_LABEL}} ", style), part))
             label = ""
 
+    def lines(self, label: str, texts: Iterable[str], style: str = "") -> None:
+        """Print each text with the label."""
+        for text in texts:
+            self.line(label, text, style)
+
     def fits(self, columns: Sequence[str], rows: Iterable[Sequence[Styled]]) -> bool:
         """Whether a table fits without folding."""
         lines = [columns, *([Text.assemble(cell).plain for cell in row] for row in rows)]

@@ -1,4 +1,6 @@
-"""Output of ``rigidsim plan`` (what would be integrated, why, at what cost) and ``rigidsim tradeoff``."""
+"""Output of ``rigidsim plan``, ``plan --physics`` and ``tradeoff``."""
+
+from __future__ import annotations
 
 import math
 import re
@@ -7,11 +9,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from rigidsim.cli.screens.page import Page, Styled
-from rigidsim.cli.screens.summary import from_step, print_understood
+from rigidsim.cli.screens.summary import arcsec_text, from_step, print_understood
 from rigidsim.scene.choices import method_named
 from rigidsim.scene.readable import bytes_text, span_text
-from rigidsim.workflows.plan import RunPlan
-from rigidsim.workflows.plan_levels import LevelCost
+from rigidsim.workflows.physics import ComparedModel, PhysicsPlan
+from rigidsim.workflows.plan import LevelCost, RunPlan
 
 _MOST_LINES = 40  # of equations
 _DIGITS = 6
@@ -54,8 +56,7 @@ def print_plan(plan: RunPlan) -> None:
     )
     if predicted.pace is None:
         on.line("", "with steps as at the start, which torques change: fewer where they brake the rotation")
-    for warning in plan.warnings:
-        on.line("warning", warning, "bold red")
+    on.lines("warning", plan.warnings, "bold red")
     error = predicted.attitude_error_rad
     if error is not None and math.isfinite(error):
         factor = predicted.amplification
@@ -158,3 +159,57 @@ def _not_measured(on: Page, settings: list[dict[str, Any]]) -> None:
     for reason, names in reasons.items():
         many = f"{len(names)} settings, from {names[0]} on" if len(names) > 4 else "; ".join(names)
         on.line("no data", f"{many}: {reason}", "yellow")
+
+
+_HEADS = ["left out", "largest", "rms", "operations", "steps", "", "what it is"]
+
+
+def print_physics(plan: PhysicsPlan) -> None:
+    """Print the result of ``rigidsim plan --physics``."""
+    on = Page()
+    on.say(
+        (plan.name, "bold"),
+        f"  over {span_text(plan.span_s)}, {plan.samples:,} samples; the full model: "
+        f"{plan.full.operations:,} operations, {plan.full.steps:,} steps",
+    )
+    if plan.compared != "quaternion":
+        on.line("compared", f"{plan.compared}, since the config's model keeps no attitude")
+    rows: list[list[Styled]] = []
+    for row in plan.effects:
+        angles = [arcsec_text(x) for x in (row.largest_arcsec, row.rms_arcsec)]
+        needed: Styled = ("required", "bold") if row.required else ""
+        rows.append([row.code, *angles, f"{row.operations:,}", f"{row.steps:,}", needed, row.words])
+    on.table(_HEADS, rows)
+    for level in plan.averaged:
+        text = f"{level.level}: {arcsec_text(level.largest_arcsec)} between the axes; it keeps no attitude"
+        on.line("averaged", text)
+    on.say("not assessed:")
+    on.lines("", (f"{absent.what}: {absent.why}" for absent in plan.not_assessed))
+    least = plan.least
+    without = ", ".join(least.left_out) or "nothing: every effect is required"
+    on.line("least", f"within {arcsec_text(plan.error_arcsec)} leave out {without}", "bold")
+    on.line("", _errors_and_cost(least))
+    for model in plan.tried[:-1]:
+        on.line("tried", f"without {', '.join(model.left_out)}: {_errors_and_cost(model)}")
+    on.line("", "the least found; another set of effects may be smaller or cheaper")
+    spent = [row.cpu_seconds for row in plan.effects]
+    ends = [span_text(min(spent), 2), span_text(max(spent), 2)]
+    whole = plan.full.cpu_seconds + sum(spent) + sum(x.cpu_seconds for x in plan.tried if len(x.left_out) > 1)
+    on.line(
+        "CPU",
+        f"{span_text(plan.full.cpu_seconds, 2)} the full model, {' to '.join(dict.fromkeys(ends))} without "
+        f"an effect, {span_text(whole, 2)} all runs",
+    )
+    on.lines("warning", plan.warnings, "bold red")
+    on.line("runs", plan.folder)
+    on.line("figure", plan.figure)
+    if plan.written is not None:
+        on.line("config", f"{plan.written}; rigidsim run {plan.written}")
+
+
+def _errors_and_cost(model: ComparedModel) -> str:
+    return (
+        f"{arcsec_text(model.largest_arcsec)} at most, {arcsec_text(model.rms_arcsec)} rms, measured "
+        f"({arcsec_text(model.expected_arcsec)} as the sum of its effects); "
+        f"{model.operations:,} operations, {model.steps:,} steps"
+    )

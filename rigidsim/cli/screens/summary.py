@@ -6,12 +6,11 @@ import math
 import shlex
 import sys
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rich.console import Console
 
 from rigidsim.cli.screens.page import Page, Styled, answer
-from rigidsim.errors import ConfigError
 from rigidsim.scene.choices import method_named, variables_named
 from rigidsim.scene.readable import YEAR, TimeWords, epoch_of, instant_text, number_text, span_text, unit_of
 from rigidsim.session.verdict import Soundness, verdict_on
@@ -28,13 +27,9 @@ from rigidsim.store.summary import (
     Span,
     Start,
     Summary,
+    Understood,
     UnderstoodBody,
 )
-
-if TYPE_CHECKING:
-    from rigidsim.workflows.check import Checked
-    from rigidsim.workflows.plan import RunPlan
-
 
 _DIGITS = 6
 _FEWER = 4
@@ -251,8 +246,7 @@ def print_summary(
 
 def _print_found(summary: Summary, on: Page, verbose: bool) -> None:
     on.line("verdict", *verdict_line(summary, brief=not verbose))
-    for warning in summary.warnings:
-        on.line("warning", warning, "bold red")
+    on.lines("warning", summary.warnings, "bold red")
     _print_errors(summary.accuracy, on, "attitude" if summary.modelling is None else "axis", verbose)
     if summary.modelling is not None:
         _print_modelling(summary.modelling, on, verbose)
@@ -261,15 +255,13 @@ def _print_found(summary: Summary, on: Page, verbose: bool) -> None:
         moved = f" (moved by {chaos.moved_over_second_half:.1g} over the second half)" if verbose else ""
         on.line("motion", f"{what}: largest Lyapunov exponent {chaos.largest_exponent:.3g} 1/s{moved}")
     if verbose or len(summary.events) <= _EVENTS:
-        for name in summary.events:
-            on.line("event", _event_text(summary, name))
+        on.lines("event", (_event_text(summary, name) for name in summary.events))
     else:
         on.line("events", ", ".join(f"{name}: {count:,}" for name, count in summary.events.items()))
     if summary.undefined_samples:
         lost = [f"{name} at {n:,} sample{'s' * (n > 1)}" for name, n in summary.undefined_samples.items()]
         on.line("missing", f"{', '.join(lost)}: undefined there, NaN is recorded")
-    for advice in filter(None, map(advice_line, summary.advice)):
-        on.line("advice", advice, "cyan")
+    on.lines("advice", filter(None, map(advice_line, summary.advice)), "cyan")
     for name, found in summary.tables.items() if verbose else ():
         on.line(
             "table",
@@ -358,7 +350,7 @@ def _print_cost(summary: Summary, on: Page, verbose: bool) -> None:
         on.line("CPU", f"{', '.join(spent)}; steps alone {span_text(cost.seconds[ENGINE])} wall")
 
 
-def print_understood(understood: Checked | RunPlan | Summary, loads: Sequence[str], on: Page) -> None:
+def print_understood(understood: Understood, loads: Sequence[str], on: Page) -> None:
     """Print body, start, time (as far as an older summary has them) and what acts as they were understood."""
     if understood.body is not None:
         on.line("body", body_text(understood.body))
@@ -416,8 +408,7 @@ def _print_invariants(summary: Summary, on: Page) -> None:
     on.table(columns, rows)
     said = "; ".join(f"{scale} ({', '.join(names)})" for scale, names in scales.items())
     on.line("drifts", f"relative to: {said}")
-    for name, why in summary.unwatched.items():
-        on.line("", f"{name} isn't monitored: {why}")
+    on.lines("", (f"{name} isn't monitored: {why}" for name, why in summary.unwatched.items()))
     if held:
         text = "correction: what the drift would have been; the residual is no independent check"
         on.line("projected", text)
@@ -432,18 +423,6 @@ def _initial(value: float | tuple[float, ...] | None) -> str:
 
 def _drift(value: float | None) -> str:
     return "-" if value is None else f"{value:.2e}"
-
-
-def print_checked(found: Checked) -> None:
-    """Print the result of a check; errors go to stderr, as for all commands."""
-    if not found.valid:
-        print(f"rigidsim: {ConfigError(found.problems, found.source)}", file=sys.stderr)
-        return
-    on = Page()
-    on.say((found.source, "bold"), "  ", ("valid", "bold green"))
-    print_understood(found, found.loads, on)
-    for text in found.warnings:
-        on.line("warning", text, "bold red")
 
 
 def print_verdict(verdict: dict[str, Any], what: str = "sample") -> None:

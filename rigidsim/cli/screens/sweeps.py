@@ -8,7 +8,7 @@ from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.scene.sweep import Sweep
 from rigidsim.session.progress import Meter, clock_text, left_text
 from rigidsim.store.sweeps.saved import FittedOfMembers, SavedSweep
-from rigidsim.workflows.fit.result import digits_text
+from rigidsim.workflows.fit.fitting import digits_text
 from rigidsim.workflows.sweeps.plan import SweepPlan
 from rigidsim.workflows.sweeps.sweep import SweepObserver
 
@@ -84,8 +84,7 @@ def print_sweep(result: SavedSweep) -> None:
         on.line("error", f"{words}: {sizes}, estimated of {error.members:,} members")
     for name, drift in outcome.largest_drifts.items():
         on.line("drift", f"{name.removesuffix('_drift')}: at most {drift:.2g}")
-    for text in outcome.warnings:
-        on.line("warning", text, "yellow")
+    on.lines("warning", outcome.warnings, "yellow")
     on.line("next", f"rigidsim plot {place}")
     if _FITS not in outcome.engines:
         on.line("", f"rigidsim view {place} --member 0")

@@ -10,7 +10,7 @@ from rigidsim.errors import RESUME, RunFolderError
 from rigidsim.store.folder import SweepFolder, folder_at
 from rigidsim.store.run import Saved, SavedRun, open_run
 from rigidsim.store.seal import check_seal, refuse_damaged
-from rigidsim.store.summary import SummaryPart, first_of
+from rigidsim.store.summary import Brief, SummaryPart, first_of
 
 if TYPE_CHECKING:
     import xarray
@@ -49,7 +49,7 @@ class FittedOfMembers(SummaryPart):
     unit: str
 
 
-class SweepSummary(SummaryPart):
+class SweepSummary(Brief):
     """Contents of a sweep's ``summary.json``; of an unfinished one, what its tiles say.
 
     Attributes:
@@ -64,11 +64,7 @@ class SweepSummary(SummaryPart):
     """
 
     kind: str = "sweep"
-    name: str = ""
-    description: str = ""
     status: str = ""
-    message: str = ""
-    exit_code: int = 0
     members: int = 0
     members_done: int = 0
     tiles: int | None = None

@@ -11,7 +11,7 @@ import io
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
 from pathlib import Path
@@ -180,117 +180,91 @@ def read_tile(path: Path, *, whole: bool = True) -> Tile:
 _HELD = 256e6  # bytes of tiles that stay in memory: each is read once for every variable
 
 
-@dataclass(frozen=True)
-class Places:
-    """Where each member's item is found, (members,) each: number of the tile, row there; -1 if nowhere."""
-
-    tile: np.ndarray
-    row: np.ndarray
-
-
-@dataclass
-class Described:
-    """A variable as tiles describe it; ``extra``: largest sizes of dimensions besides the members'."""
-
-    variable: KeptVariable
-    whole: bool
-    extra: tuple[int, ...]
-
-
-@dataclass
-class Gathered:
-    """What the tiles hold, known before their numbers are read again: among it sample times that all members
-    share (None if they differ, or aren't kept), and by member why it failed.
-    """
-
-    variables: dict[str, Described] = field(default_factory=dict)
-    times: np.ndarray | None = None
-    reasons: dict[int, str] = field(default_factory=dict)
-    made: list[Mapping[str, Any]] = field(default_factory=list)
-
-
 class Sources:
-    """Tiles, by their files in a sweep's folder (``place``), for a sweep's members."""
+    """Tiles, by their files in a sweep's folder (``place``), for a sweep's members.
+
+    Attributes:
+        keys: of the members.
+        variables: what is kept, with the largest sizes of dimensions besides the members' and no numbers,
+            once ``gather`` has read the tiles. times: samples that all members share, s; None if they
+            differ, or aren't kept. reasons: by member why it failed. made: by what each tile was made.
+    """
 
     def __init__(self, sweep: Sweep, place: Path, files: Sequence[Path]) -> None:
         self.keys, self._items, self._place, self._files = keys_of(sweep), items_of(sweep), place, files
         size = sum(path.stat().st_size for path in files)
-        self.tile = lru_cache(int(_HELD * len(files) / max(size, 1)) + 1)(self._read)
-
-    def _read(self, number: int) -> Tile:
-        return read_tile(self._files[number])
+        self.tile = lru_cache(int(_HELD * len(files) / max(size, 1)) + 1)(lambda n: read_tile(files[n]))
+        self.variables: Kept = {}
+        self.times: np.ndarray | None = None
+        self.reasons: dict[int, str] = {}
+        self.made: list[Mapping[str, Any]] = []
 
     @cached_property
-    def places(self) -> dict[str, Places]:
-        """Where everything kept is found, by item."""
+    def places(self) -> dict[str, np.ndarray]:
+        """Where everything kept is found, by item: (2, members), number of the tile and row there; -1 if
+        nowhere.
+        """
         heads = [read_tile(path, whole=False) for path in self._files]
         return {item: self._find(item, heads) for item in self._items}
 
-    def _find(self, item: str, heads: Sequence[Tile]) -> Places:
+    def _find(self, item: str, heads: Sequence[Tile]) -> np.ndarray:
         numbers = [number for number, one in enumerate(heads) if item in one.items]
         lengths = [len(heads[number].keys) for number in numbers]
         if not sum(lengths):
-            nowhere = np.full(len(self.keys), -1)
-            return Places(nowhere, nowhere)
+            return np.full((2, len(self.keys)), -1)
         known = np.concatenate([heads[number].keys for number in numbers])
         order = np.argsort(known, kind="stable")  # the oldest comes first
         at = order[np.minimum(np.searchsorted(known, self.keys, sorter=order), len(known) - 1)]
-        there = known[at] == self.keys
         rows = np.concatenate([np.arange(length) for length in lengths])
-        tiles = np.repeat(numbers, lengths)
-        return Places(np.where(there, tiles[at], -1), np.where(there, rows[at], -1))
+        return np.where(known[at] == self.keys, np.stack([np.repeat(numbers, lengths), rows])[:, at], -1)
 
     @cached_property
     def missing(self) -> np.ndarray:
         """Mask of the members that lack any item."""
-        return np.logical_or.reduce([places.tile < 0 for places in self.places.values()])
+        return np.logical_or.reduce([tiles < 0 for tiles, _ in self.places.values()])
 
     def wanted(self, block: range) -> tuple[np.ndarray, tuple[str, ...]]:
         """Of a block of members those to be computed, one for each key, and the items that any lacks."""
         some = block.start + np.flatnonzero(self.missing[block.start : block.stop])
         _, first = np.unique(self.keys[some], return_index=True)
-        items = [item for item, places in self.places.items() if (places.tile[some] < 0).any()]
+        items = [item for item, (tiles, _) in self.places.items() if (tiles[some] < 0).any()]
         return some[np.sort(first)], tuple(items)
 
     def parts(self) -> Iterator[tuple[Tile, np.ndarray, np.ndarray]]:
         """All tiles in which members are found, with these and their rows there."""
-        always = self.places[ALWAYS]
-        order = np.argsort(always.tile, kind="stable")
-        for group in np.split(order, np.flatnonzero(np.diff(always.tile[order])) + 1):
-            yield self.tile(int(always.tile[group[0]])), group, always.row[group]
+        tiles, rows = self.places[ALWAYS]
+        order = np.argsort(tiles, kind="stable")
+        for group in np.split(order, np.flatnonzero(np.diff(tiles[order])) + 1):
+            yield self.tile(int(tiles[group[0]])), group, rows[group]
 
-    def gather(self) -> Gathered:
+    def gather(self) -> None:
         """Read once every tile that is used; RunFolderError if one is gone, damaged, or disagrees with
         others.
         """
         if gone := int(self.missing.sum()):
             raise RunFolderError(f"{self._place}: tiles of {gone:,} members are gone; {RESUME} computes them")
-        found = Gathered()
         common: np.ndarray | None = None
         alike = True
-        wanted = {item: set(np.unique(places.tile).tolist()) for item, places in self.places.items()}
+        wanted = {item: set(np.unique(tiles).tolist()) for item, (tiles, _) in self.places.items()}
         for number in sorted(set().union(*wanted.values())):
             tile = self.tile(number)
-            found.made.append(tile.made)
+            self.made.append(tile.made)
             items = {plain(item) for item, numbers in wanted.items() if number in numbers}
-            for name, variable in tile.kept.items():
-                if variable.item in items:
-                    self._describe(found.variables, name, variable)
+            for name, one in tile.kept.items():
+                if one.item not in items:
+                    continue
+                known = self.variables.get(name, one)
+                if known.dims != one.dims:
+                    raise RunFolderError(f"{self._place}: tiles disagree about {name}")
+                extra = map(max, known.values.shape[1:], one.values.shape[1:])
+                self.variables[name] = replace(known, values=np.empty((0, *extra), known.values.dtype))
             if "series" in items and alike and "time" in tile.kept and tile.kept["time"].values.size:
                 common, alike = _common(common, tile.kept["time"].values)
-        found.times = common if alike else None
+        self.times = common if alike else None
         for tile, members, rows in self.parts():
             for member, row in zip(members.tolist(), rows.tolist(), strict=True) if tile.reasons else ():
                 if row in tile.reasons:
-                    found.reasons[member] = tile.reasons[row]
-        return found
-
-    def _describe(self, known: dict[str, Described], name: str, variable: KeptVariable) -> None:
-        sizes = variable.values.shape[1:]
-        one = known.setdefault(name, Described(variable, variable.values.dtype.kind == "i", sizes))
-        if one.variable.dims != variable.dims:
-            raise RunFolderError(f"{self._place}: tiles disagree about {name}")
-        one.extra = tuple(map(max, one.extra, sizes))
+                    self.reasons[member] = tile.reasons[row]
 
 
 def _common(known: np.ndarray | None, rows: np.ndarray) -> tuple[np.ndarray | None, bool]:
@@ -307,6 +281,7 @@ def _common(known: np.ndarray | None, rows: np.ndarray) -> tuple[np.ndarray | No
 _GZIP = 4
 _BOX_NUMBERS = 1 << 22  # numbers of a variable that are gathered at once: 32 MB
 _CHUNK_NUMBERS = 1 << 17
+_SMALL = 512  # numbers of a variable that is stored in one piece
 _SAMPLES = "sample"
 _UNIT = "_unit"
 
@@ -343,26 +318,19 @@ SUFFIXES = ("_final", "_min", "_max", "_mean", "_largest", "_time", "_times", "_
 """Suffixes of the names of variables that are kept."""
 
 
-def write_dataset(
-    path: Path,
-    sweep: Sweep,
-    sources: Sources,
-    found: Gathered,
-    attributes: Mapping[str, Any],
-) -> str:
-    """Write the dataset atomically; returns the digest of the file."""
+def write_dataset(path: Path, sweep: Sweep, sources: Sources, attributes: Mapping[str, Any]) -> str:
+    """Write what was gathered atomically; returns the digest of the file."""
     with atomic.replacing(path) as temporary:
         with sink(temporary) as target, writing(target) as file:
             file.attributes(attributes)
-            beside = _coordinates(file, sweep)
-            created = _declared(file, sweep, found, beside)
-            for name, (target_variable, described) in created.items():
-                item = next(item for item in sources.places if plain(item) == described.variable.item)
-                for first, shape, flat in boxes(sweep.shape, math.prod(described.extra)):
-                    values = _values(name, described, item, sources, flat)
+            created = _declared(file, sweep, sources, _coordinates(file, sweep))
+            for name, (target_variable, one) in created.items():
+                item, extra = next(x for x in sources.places if plain(x) == one.item), one.values.shape[1:]
+                for first, shape, flat in boxes(sweep.shape, math.prod(extra)):
+                    values = _values(name, one.values, item, sources, slice(flat.start, flat.stop))
                     place = tuple(slice(i, i + n) for i, n in zip(first, shape, strict=True))
-                    target_variable[place] = values.reshape(*shape, *described.extra)
-            _write_reasons(file, found.reasons)
+                    target_variable[place] = values.reshape(*shape, *extra)
+            _write_reasons(file, sources.reasons)
         return seal(temporary)[1]
 
 
@@ -377,7 +345,7 @@ def _coordinates(file: NetcdfFile, sweep: Sweep) -> str:
         if not axis.numeric:
             texts = [_bare(axis.text(i)) for i in range(axis.count)]
             del described["units"]
-            file.texts(axis.name, dim, texts, described)
+            file.texts(axis.name, texts, dim, described)
             beside += [] if dim == axis.name else [axis.name]
             continue
         numbers = label_numbers(axis)
@@ -404,46 +372,39 @@ def _bare(text: str) -> str:
 
 
 def _declared(
-    file: NetcdfFile, sweep: Sweep, found: Gathered, beside: str
-) -> dict[str, tuple[Any, Described]]:
-    created = {}
+    file: NetcdfFile, sweep: Sweep, sources: Sources, beside: str
+) -> dict[str, tuple[Any, KeptVariable]]:
+    created: dict[str, tuple[Any, KeptVariable]] = {}
     labelled = LABELS | {"rotor": [rotor.name for rotor in sweep.base.config.rotors]}
     samples = _SAMPLES
-    if found.times is not None:
+    if sources.times is not None:
         samples = "time"
-        file.dimension("time", len(found.times))
+        file.dimension("time", len(sources.times))
         labels = {"units": "s", "long_name": "time of the scene"}
-        file.variable("time", ("time",), labels)[...] = found.times
-    for name, described in sorted(found.variables.items()):
-        if name == "time" and found.times is not None:
+        file.variable("time", ("time",), labels)[...] = sources.times
+    for name, one in sorted(sources.variables.items()):
+        if name == samples:
             continue
-        dims = [samples if dim == _SAMPLES else dim for dim in described.variable.dims]
-        known = {**labelled, **described.variable.labels}
-        for dim, size in zip(dims, described.extra, strict=True):
+        dims, extra = [samples if dim == _SAMPLES else dim for dim in one.dims], one.values.shape[1:]
+        known = {**labelled, **one.labels}
+        for dim, size in zip(dims, extra, strict=True):
             if dim in known:
-                file.labels(dim, known[dim])
+                file.texts(dim, known[dim])
             else:
                 file.dimension(dim, size)
-        attributes = {k: v for k, v in described.variable.attributes.items() if v is not None}
-        if more := " ".join(filter(None, [beside, *_labels(file, described)])):
+        attributes = {k: v for k, v in one.attributes.items() if v is not None}
+        units = [label for label in one.labels if label.endswith(_UNIT)]
+        for label in units:  # which are no dimensions
+            file.texts(label, one.labels[label], label.removesuffix(_UNIT))
+        if more := " ".join(filter(None, [beside, *units])):
             attributes["coordinates"] = more
-        chunk = chunk_shape(sweep.shape, described.extra)
-        small = math.prod(sweep.shape) * math.prod(described.extra) < 512
+        small = math.prod(sweep.shape) * math.prod(extra) < _SMALL
         variable = file.variable(
-            name, (*sweep.dims, *dims), attributes,
-            chunk=None if small else chunk, gzip=None if small else _GZIP, whole=described.whole,
+            name, (*sweep.dims, *dims), attributes, chunk=None if small else chunk_shape(sweep.shape, extra),
+            gzip=None if small else _GZIP, whole=one.values.dtype.kind == "i",
         )  # fmt: skip
-        created[name] = (variable, described)
+        created[name] = (variable, one)
     return created
-
-
-def _labels(file: NetcdfFile, described: Described) -> list[str]:
-    """Write a variable's own labels; returns the names of those that are no dimensions."""
-    own = described.variable.labels
-    for name, texts in own.items():
-        if name.endswith(_UNIT):
-            file.texts_once(name, name.removesuffix(_UNIT), texts)
-    return [name for name in own if name.endswith(_UNIT)]
 
 
 def chunk_shape(members: Sequence[int], extra: Sequence[int]) -> tuple[int, ...]:
@@ -480,11 +441,9 @@ def boxes(
             yield first, shape, range(begin, begin + (high - low) * within)
 
 
-def _values(name: str, described: Described, item: str, sources: Sources, flat: range) -> np.ndarray:
-    places, part = sources.places[item], slice(flat.start, flat.stop)
-    tiles, rows = places.tile[part], places.row[part]
-    kind, lacking = (np.int64, 0) if described.whole else (np.float64, np.nan)
-    values = np.full((len(tiles), *described.extra), lacking, dtype=kind)
+def _values(name: str, like: np.ndarray, item: str, sources: Sources, part: slice) -> np.ndarray:
+    tiles, rows = sources.places[item][:, part]
+    values = np.full((len(tiles), *like.shape[1:]), 0 if like.dtype.kind == "i" else np.nan, like.dtype)
     edges = np.concatenate([[0], np.flatnonzero(np.diff(tiles)) + 1, [len(tiles)]])
     for low, high in pairwise(edges):
         held = sources.tile(int(tiles[low])).kept.get(name)
@@ -504,4 +463,4 @@ def _write_reasons(file: NetcdfFile, reasons: Mapping[int, str]) -> None:
         chunk=None, gzip=None, whole=True,
     )  # fmt: skip
     numbers[...] = members
-    file.texts("failed_reason", "failed", [reasons[m] for m in members], {"long_name": "why"})
+    file.texts("failed_reason", [reasons[m] for m in members], "failed", {"long_name": "why"})

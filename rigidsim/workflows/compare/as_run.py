@@ -20,10 +20,13 @@ from rigidsim.formats.trajectories import Trajectory, is_trajectory, read_trajec
 from rigidsim.scene.scene import Scene
 from rigidsim.store.run import Run, SavedRun, ShownRun, open_run
 from rigidsim.store.summary import Brief
-from rigidsim.workflows.compare.columns import ANGLES, QUATERNION, Attitudes, attitudes_of
 from rigidsim.workflows.compare.conventions import (
+    ANGLES,
+    QUATERNION,
+    Attitudes,
     Convention,
     attitude_conventions,
+    attitudes_of,
     find_convention,
     rate_conventions,
 )

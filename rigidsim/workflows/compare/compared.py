@@ -18,8 +18,14 @@ from rigidsim.store.outputs import refuse_loss, writing
 from rigidsim.store.run import Run
 from rigidsim.store.summary import SummaryPart
 from rigidsim.workflows.compare.as_run import dataset_of_rows, files_of, trajectory_given
-from rigidsim.workflows.compare.columns import LEAST_ROWS, Attitudes, attitudes_of, size_of
-from rigidsim.workflows.compare.conventions import Convention, find_convention
+from rigidsim.workflows.compare.conventions import (
+    LEAST_ROWS,
+    Attitudes,
+    Convention,
+    attitudes_of,
+    find_convention,
+    size_of,
+)
 from rigidsim.workflows.compare.defects import rms
 from rigidsim.workflows.compare.evidence import Evidence, judged
 from rigidsim.workflows.read import Given, as_experiment, refuse_backwards

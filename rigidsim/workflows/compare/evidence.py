@@ -17,9 +17,8 @@ from rigidsim.scene.row_rotations import angles_between, normalised
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.from_states import FromStates, NotFromStates, RowStates
 from rigidsim.workflows.compare import defects
-from rigidsim.workflows.compare.attitudes_alone import MOMENTS, STEADY, WIDER, WindowsOfAttitudes
-from rigidsim.workflows.compare.columns import QUATERNION, Attitudes, size_of
-from rigidsim.workflows.compare.conventions import Convention
+from rigidsim.workflows.compare.conventions import QUATERNION, Attitudes, Convention, size_of
+from rigidsim.workflows.compare.defects import MOMENTS, STEADY, WIDER, WindowsOfAttitudes
 
 AGREES, INTEGRATION_ERROR, WRONG_MODEL, UNDECIDED = "agrees", "integration_error", "wrong_model", "undecided"
 INCONSISTENT_RATES = "inconsistent_rates"

@@ -1,34 +1,533 @@
-"""``rigidsim fit``: an experiment's parameters from observations, kept in a folder, made again, viewed."""
+"""``rigidsim fit``: an experiment's parameters from observations, as typed values with dataset, figure and
+fitted config; kept in a folder, viewed.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from html import escape
+from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
+from pydantic import PrivateAttr
 
 from rigidsim.errors import FORCE, RESUME, SWEEP, ConfigError, Problem, Remedy, RigidsimError, RunFolderError
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.row_rotations import conjugated, multiplied, normalised, turned, vector_of
 from rigidsim.store import atomic, provenance
 from rigidsim.store.folder import FitFolder
 from rigidsim.store.outputs import refuse_inputs
-from rigidsim.workflows.fit.estimation import Weighing, search
-from rigidsim.workflows.fit.keys import FitKeys
+from rigidsim.store.run import ShownRun
+from rigidsim.store.summary import SummaryPart
+from rigidsim.workflows.fit.estimation import Ended, Solution, Weighing, consider_covariance, search
 from rigidsim.workflows.fit.observations import (
+    QUATERNION,
     DataFiles,
+    Readings,
     content,
     digest,
     files_beside,
     observing,
     read_readings,
 )
-from rigidsim.workflows.fit.predictions import ByDifferences, ByTangents, Predictor
-from rigidsim.workflows.fit.result import KIND, FitResult, result_of
+from rigidsim.workflows.fit.predictions import (
+    ByDifferences,
+    ByTangents,
+    FitKey,
+    FitKeys,
+    Prediction,
+    Predictor,
+)
 from rigidsim.workflows.read import Given, as_experiment, load
+from rigidsim.workflows.run import run
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+KIND = "fit"
+_COVARIANCE = "attitude_covariance"
+_ROUNDING = 1e-6  # rad: between two ways of integrating a motion that isn't chaotic
+_SHARE = 0.1  # of a sigma, by which these may differ where the motion amplifies both
+_NOTHING = 1e-6  # of a direction's largest part, below which another may be rounding
+_PART = 1e-3  # of a direction of norm one, below which a number takes no part in it
+
+
+class FittedParameter(SummaryPart):
+    """One number that was estimated, SI.
+
+    Attributes:
+        sigma: standard deviation by the sigmas of data, priors and considered numbers; None if undetermined.
+        scaled_sigma: the same with the data's sigmas multiplied so that the residuals fit them.
+        start: the config's value. prior_sigma: of its prior; None for none.
+    """
+
+    key: str
+    unit: str
+    value: float
+    sigma: float | None
+    scaled_sigma: float | None
+    start: float
+    prior_sigma: float | None
+
+
+class Undetermined(SummaryPart):
+    """Numbers that the data can't separate, or don't determine at all.
+
+    Attributes:
+        keys: those that take part. amounts: by how much each changes along the direction, SI: the data
+            stay the same to first order. text: the same in words.
+    """
+
+    keys: list[str]
+    amounts: list[float]
+    text: str
+
+
+class Outlier(SummaryPart):
+    """A row that was left out; ``sigmas``: its largest residual."""
+
+    data: int
+    observable: str
+    row: str
+    time: float
+    sigmas: float
+
+
+class FittedData(SummaryPart):
+    """One set of observations; ``rms``: of the residuals of used rows, in ``unit``; ``sigmas``: the same over
+    their sigmas.
+    """
+
+    number: int
+    file: str
+    sha256: str
+    observable: str
+    rows: int
+    used: int
+    rms: float
+    unit: str
+    sigmas: float
+
+
+class ConsideredNumber(SummaryPart):
+    """A number that wasn't estimated, and by how much each estimated one follows it, SI."""
+
+    key: str
+    unit: str
+    value: float
+    sigma: float
+    effect: list[float]
+
+
+class FitResult(SummaryPart):
+    """Parameters of an experiment, estimated from observations.
+
+    Attributes:
+        chi_square: sum of squares of used residuals in sigmas, with the priors'. freedom: used numbers less
+            determined parameters. scale: root of their ratio, by which scaled sigmas differ; None without.
+        correlations: between parameters, in their order; None for undetermined ones.
+        evaluations: of the motion in the last round. starts: how many, and the sums of squares where each
+            ended. derivatives: where they came from.
+        told: what a user should know besides. folder: of its files; empty if nowhere.
+    """
+
+    kind: str = KIND
+    name: str
+    converged: bool
+    parameters: list[FittedParameter]
+    correlations: list[list[float | None]]
+    undetermined: list[Undetermined]
+    outliers: list[Outlier]
+    considered: list[ConsideredNumber]
+    data: list[FittedData]
+    chi_square: float
+    freedom: int
+    scale: float | None
+    evaluations: int
+    starts: list[float | None]
+    derivatives: str
+    told: list[str]
+    folder: str = ""
+
+    _dataset: Any = PrivateAttr(default=None)
+    _experiment: Any = PrivateAttr(default=None)
+
+    @property
+    def dataset(self) -> xarray.Dataset:
+        """Parameters, covariances, residuals, and predicted uncertainties along time, with their units."""
+        found: xarray.Dataset = self._dataset
+        return found
+
+    @property
+    def experiment(self) -> Experiment:
+        """The config with the estimated values, without ``[fit]``."""
+        found: Experiment = self._experiment
+        return found
+
+    def value(self, key: str) -> float:
+        """The estimated value of a parameter, SI; ``KeyError`` for others."""
+        return self._parameter(key).value
+
+    def sigma(self, key: str) -> float | None:
+        """Its standard deviation, SI; None if undetermined."""
+        return self._parameter(key).sigma
+
+    def _parameter(self, key: str) -> FittedParameter:
+        for one in self.parameters:
+            if one.key == key:
+                return one
+        raise KeyError(f"{key}; parameters are {', '.join(one.key for one in self.parameters)}")
+
+    def plot(self) -> Figure:
+        """Residuals, correlations, predicted uncertainty along time and the ellipse of the pole."""
+        from rigidsim.look.figures.fitted import fitted_figure
+
+        return fitted_figure(self.dataset)
+
+    def view(
+        self, *, web: bool = False, png: str | Path | None = None, at: float | str | None = None,
+        part: str = "page",
+    ) -> int:  # fmt: skip
+        """The fitted motion in the viewer, with a cone of one standard deviation about the figure axis, or a
+        picture of it; arguments, value and errors as in ``Run.view``.
+        """
+        shown = fitted_run(self.experiment, self.dataset, self.folder or "memory")
+        return shown.view(web=web, png=png, at=at, part=part)
+
+    def __repr__(self) -> str:
+        lines = [f"<FitResult {self.name!r}: {self.sentence}"]
+        lines += [f"  {one.key} = {value_text(one)}" for one in self.parameters]
+        return "\n".join(lines) + ">"
+
+    __str__ = __repr__
+
+    @property
+    def sentence(self) -> str:
+        """The fit in one line."""
+        state = "converged" if self.converged else "NOT converged"
+        left = f", {len(self.outliers)} left out" if self.outliers else ""
+        rows = sum(one.used for one in self.data)
+        size = "" if self.scale is None else f", residuals {self.scale:.3g} sigmas"
+        return f"{state}, {rows:,} row{'' if rows == 1 else 's'}{left}{size}"
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><th>{escape(one.key)}</th><td>{escape(value_text(one))}</td></tr>"
+            for one in self.parameters
+        )
+        unknown = "".join(f"<p>undetermined: {escape(one.text)}</p>" for one in self.undetermined)
+        return f"<b>{escape(self.name)}</b>: {escape(self.sentence)}<table>{rows}</table>{unknown}"
+
+
+def value_text(one: FittedParameter) -> str:
+    """Value and sigma, to two digits of the sigma, with the unit."""
+    unit = "" if one.unit == "1" else f" {one.unit}"
+    if one.sigma is None:
+        return f"{one.value:.6g}{unit} (undetermined)"
+    return f"{digits_text(one.value, one.sigma)} +- {one.sigma:.2g}{unit}"
+
+
+def digits_text(value: float, sigma: float) -> str:
+    """A value to the second digit of its sigma."""
+    if not sigma > 0 or not math.isfinite(sigma):
+        return f"{value:.12g}"
+    size = math.floor(math.log10(max(abs(value), sigma)))
+    digits = min(16, max(2, size - math.floor(math.log10(sigma)) + 2))
+    return f"{value:.{digits}g}"
+
+
+# --- from where a fit ended ---------------------------------------------------------------------------------
+
+
+def result_of(
+    name: str, keys: FitKeys, weighing: Weighing, ended: Ended, costs: Sequence[float], derivatives: str,
+    notes: Sequence[str], along: Prediction, times: np.ndarray,
+) -> FitResult:  # fmt: skip
+    """The result of a search, with its dataset and the fitted config.
+
+    Args:
+        costs: sums of squares where each start ended.
+        derivatives: where they came from. notes: what a user should know besides.
+        along: predictions with derivatives at times (s) along the run, as far as the scene has them.
+    """
+    linear, solution, values, count = ended.linear, ended.solution, ended.values, len(keys.estimated)
+    known = np.array([one.sigma or 0.0 for one in keys.considered])
+    covariance, sensitivity = consider_covariance(linear, solution, known)
+    null = solution.null / solution.scales  # rows in the numbers' own units
+    directions, parts = _directions(null, solution.scales, np.array([one.size for one in keys.estimated]))
+    determined = ~parts.any(axis=0)
+    sets = list(zip(weighing.readings, weighing.used, linear.sets, strict=True))
+    used = sum(int(u.sum()) * r.sigmas.shape[1] for r, u, _ in sets)
+    freedom = used + int((linear.weights > 0).sum()) - count + len(null)
+    scale = float(np.sqrt(linear.cost / freedom)) if freedom > 0 else None
+    sigmas = np.where(determined, np.sqrt(np.diag(covariance)[:count]), np.nan)
+    scaled = np.full(count, np.nan)
+    if scale:  # the data's sigmas times this; priors and considered numbers keep theirs
+        other = {key: getattr(linear, key) / scale for key in ("residuals", "slopes", "noise")}
+        formal = Solution(replace(linear, **other)).covariance
+        formal += sensitivity @ np.diag(known**2) @ sensitivity.T
+        scaled = np.where(determined, np.sqrt(np.diag(formal)), np.nan)
+    correlations = covariance[:count, :count] / np.outer(sigmas, sigmas)
+    undetermined = []
+    for direction, part in zip(directions, parts, strict=True):
+        members = [one for one, p in zip(keys.estimated, part, strict=True) if p]
+        text = _direction_text(members, values[part], direction[part])
+        names = [one.key for one in members]
+        undetermined.append(Undetermined(keys=names, amounts=direction[part].tolist(), text=text))
+    made = FitResult(
+        kind=KIND,
+        name=name,
+        converged=ended.converged,
+        parameters=[
+            FittedParameter(
+                key=one.key, unit=one.unit, value=float(values[n]), sigma=_finite(sigmas[n]),
+                scaled_sigma=_finite(scaled[n]), start=one.start, prior_sigma=one.sigma,
+            )
+            for n, one in enumerate(keys.estimated)
+        ],
+        correlations=[[_finite(x) for x in row] for row in correlations],
+        undetermined=undetermined,
+        outliers=[
+            Outlier(
+                data=readings.number, observable=readings.quantity.text, row=readings.rows[int(n)],
+                time=float(readings.times[n]), sigmas=float(size[n]),
+            )
+            for (readings, kept, _), size in zip(sets, weighing.sizes(linear.sets), strict=True)
+            for n in np.flatnonzero(~kept)
+        ],
+        considered=[
+            ConsideredNumber(
+                key=one.key, unit=one.unit, value=one.start, sigma=known[n], effect=sensitivity[:, n].tolist()
+            )
+            for n, one in enumerate(keys.considered)
+        ],
+        data=[_data_of(*one) for one in sets],
+        chi_square=linear.cost,
+        freedom=freedom,
+        scale=scale,
+        evaluations=ended.evaluations,
+        starts=[_finite(cost) for cost in costs],
+        derivatives=derivatives,
+        told=[*notes, *_counted_twice(weighing.readings)],
+    )  # fmt: skip
+    known_words = {"long_name": "covariance with considered numbers; nan if undetermined"}
+    square = ("parameter", "other_parameter")
+    shown = np.where(np.outer(determined, determined), covariance[:count, :count], np.nan)
+    names = [one.key for one in keys.estimated]
+    variables: dict[str, Any] = {
+        "value": ("parameter", values, {"long_name": "estimate, in parameter_unit"}),
+        "start": ("parameter", [one.start for one in keys.estimated], {"long_name": "value in the config"}),
+        "sigma": ("parameter", sigmas, {"long_name": "standard deviation; nan if undetermined"}),
+        "scaled_sigma": ("parameter", scaled, {"long_name": "the same, scaled by the residuals"}),
+        "covariance": (square, shown, known_words),
+        "correlation": (square, correlations, {"units": "1"}),
+        "undetermined": (
+            ("direction", "parameter"), null, {"long_name": "directions that nothing determines"}
+        ),
+    }  # fmt: skip
+    if keys.considered:
+        words = {"long_name": "change of the parameter with a considered number"}
+        variables["consider_sensitivity"] = (("parameter", "considered"), sensitivity, words)
+    coordinates = {
+        "parameter": names,
+        "other_parameter": names,
+        "parameter_unit": ("parameter", [one.unit for one in keys.estimated]),
+        "considered": np.array([one.key for one in keys.considered], dtype=str),
+        "time": ("time", times, {"units": "s"}),
+    }
+    attributes = {"title": f"fit of {name}", "kind": KIND, "converged": int(made.converged)}
+    attributes |= {key: getattr(made, key) for key in ("chi_square", "freedom", "derivatives", "sentence")}
+    dataset = xarray.Dataset(variables, coordinates, attributes)
+    for readings, kept, residuals in sets:
+        dataset = dataset.merge(_residuals_of(readings, kept, residuals))
+
+    def spread(slopes: np.ndarray) -> np.ndarray:
+        """Covariances (times, components, components) by slopes (times, components, numbers); nan where an
+        undetermined direction would show.
+        """
+        found = np.einsum("nij,jk,nlk->nil", slopes, covariance, slopes)
+        if len(null):  # one unit of a scaled direction is about a sigma of all data together
+            apart = np.abs(np.einsum("nij,dj->nid", slopes[:, :, :count], null)).max(axis=(1, 2))
+            found[apart > 1e-3 * np.sqrt(np.einsum("nii->n", found))] = np.nan
+        return np.asarray(found)
+
+    made._dataset = dataset.merge(_along(along, spread, keys))
+    made._experiment = keys.fitted(values)
+    return made
+
+
+def _data_of(readings: Readings, used: np.ndarray, residuals: np.ndarray) -> FittedData:
+    kept, sigmas = residuals[used], readings.sigmas[used]
+    return FittedData(
+        number=readings.number,
+        file=readings.source,
+        sha256=readings.sha256,
+        observable=readings.quantity.text,
+        rows=len(used),
+        used=len(kept),
+        rms=float(np.sqrt(np.mean(np.sum(kept**2, axis=1)))) if len(kept) else np.nan,
+        unit=readings.unit,
+        sigmas=float(np.sqrt(np.mean((kept / sigmas) ** 2))) if len(kept) else np.nan,
+    )
+
+
+def _residuals_of(readings: Readings, used: np.ndarray, residuals: np.ndarray) -> xarray.Dataset:
+    """Residuals of one set of observations, with what was used."""
+    n, unit = readings.number, {"units": readings.unit}
+    row, component = f"row_{n}", f"component_{n}"
+    words = {**unit, "long_name": readings.label, "observable": readings.quantity.text}
+    labels = ["X", "Y", "Z"] if readings.quantity.rotation else list(readings.quantity.components)
+    return xarray.Dataset(
+        {
+            f"residual_{n}": ((row, component), residuals, words),
+            f"residual_sigma_{n}": ((row, component), readings.sigmas, unit),
+            f"used_{n}": (row, used.astype(np.int8), {"long_name": "1: used, 0: outlier"}),
+        },
+        {component: labels, f"time_{n}": (row, readings.times, {"units": "s"})},
+    )
+
+
+def _along(along: Prediction, spread: Callable[[np.ndarray], np.ndarray], keys: FitKeys) -> xarray.Dataset:
+    """Predictions along time with their uncertainty."""
+    made: dict[str, Any] = {}
+    for name, (dim, labels, unit, sigma_unit) in _ALONG.items():
+        if name not in along.values:
+            continue
+        values, found = along.values[name], spread(along.slopes[name])
+        rotation = name == QUATERNION
+        axes, subject = ("space_axis" if rotation else dim), ("attitude" if rotation else name)
+        words = {"units": sigma_unit, "long_name": "predicted standard deviation"}
+        made |= {dim: list(labels), axes: list("XYZ" if axes == "space_axis" else "xyz")}
+        made[name] = (("time", dim), values, {"units": unit})
+        made[f"{subject}_sigma"] = (("time", axes), np.sqrt(np.einsum("nii->ni", found)), words)
+        if rotation:
+            more = {"units": "rad2", "long_name": "predicted covariance of the attitude as a rotation vector"}
+            pole = turned(values, np.array([[float(x) for x in keys.scene.figure.pole]]))
+            made["other_space_axis"] = list("XYZ")
+            made[_COVARIANCE] = (("time", axes, "other_space_axis"), found, more)
+            made["figure_axis"] = (("time", axes), pole, {"units": "1"})
+            words |= {"long_name": f"{words['long_name']}, space axes", "frame": "space axes"}
+    return xarray.Dataset(made)
+
+
+_ALONG = {
+    QUATERNION: ("quaternion_component", "wxyz", "1", "rad"),
+    "angular_velocity": ("body_axis", "xyz", "rad s-1", "rad s-1"),
+    "position": ("space_axis", "XYZ", "m", "m"),
+}
+"""Dimension, labels and unit of what is predicted along the run, and the unit of its uncertainty."""
+
+
+def _directions(null: np.ndarray, scales: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Undetermined directions of few numbers, one a row in the numbers' own units, and which take part."""
+    directions = _simplest(null / sizes) * sizes
+    scaled = np.abs(directions * scales)
+    scaled /= np.maximum(scaled.max(axis=1, keepdims=True), 1e-300)
+    # what data hardly depend on has a small part of its column's size, and all the same moves along
+    return directions, (scaled > _PART) | ((np.abs(directions / sizes) > _PART) & (scaled > _NOTHING))
+
+
+def _counted_twice(sets: Sequence[Readings]) -> list[str]:
+    """Of which sets rows are the same observations."""
+    found = []
+    for one, other in combinations(sets, 2):
+        if one.quantity.text != other.quantity.text:
+            continue
+        rows = [
+            {(t, *v) for t, v in zip(x.times.tolist(), x.values.tolist(), strict=True)} for x in (one, other)
+        ]
+        if same := len(rows[0] & rows[1]):
+            found.append(
+                f"data {one.number} and {other.number} have rows with the same time and values of "
+                f"{one.quantity.text} ({same:,}), which count twice and make sigmas too small: "
+                "remove one of each"
+            )
+    return found
+
+
+def _simplest(directions: np.ndarray) -> np.ndarray:
+    """The same space by directions of few numbers: reduced row echelon form, the largest entries leading."""
+    rows = np.array(directions, dtype=float)
+    lead: list[int] = []
+    for n in range(len(rows)):
+        free = [j for j in range(rows.shape[1]) if j not in lead]
+        rest = np.abs(rows[n:, free])
+        i, j = divmod(int(np.argmax(rest)), len(free))
+        rows[[n, n + i]] = rows[[n + i, n]]
+        column = free[j]
+        rows[n] /= rows[n, column]
+        for other in range(len(rows)):
+            if other != n:
+                rows[other] -= rows[other, column] * rows[n]
+        lead.append(column)
+    return rows / np.abs(rows).max(axis=1, keepdims=True) if len(rows) else rows
+
+
+def _direction_text(keys: Sequence[FitKey], values: np.ndarray, amounts: np.ndarray) -> str:
+    if len(keys) == 1:
+        return f"{keys[0].key}: no row depends on it"
+    relative = np.divide(amounts, values, out=np.full(len(keys), np.nan), where=values != 0)
+    names = " and ".join([", ".join(one.key for one in keys[:-1]), keys[-1].key])
+    if np.isfinite(relative).all() and np.ptp(relative) < 1e-3 * np.abs(relative).max():
+        return f"{names}: only their ratios show"
+    changes = ", ".join(f"{one.key} by {x:.3g}" for one, x in zip(keys, amounts, strict=True))
+    return f"{names}: changed together ({changes}) they leave all rows as they are"
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+# --- a fitted motion --------------------------------------------------------------------------------------
+
+
+def fitted_run(experiment: Experiment, fit: xarray.Dataset, source: str = "memory") -> ShownRun:
+    """Run a fitted experiment at the times of its fit's dataset, and put the predicted covariance beside it.
+
+    Args:
+        experiment: with the estimated values. fit: the fit's dataset.
+
+    Raises:
+        RunFolderError: the experiment's motion isn't the dataset's.
+    """
+    asked = experiment.config.output.record
+    more = asked is not None and QUATERNION not in asked and _COVARIANCE in fit
+    record = [*asked, QUATERNION] if more and asked else None
+    # without its own error, which would mislead beside the fit's
+    made = run(experiment.quiet(record, fit["time"].values.tolist()), out=None, progress=False)
+    found = made.dataset
+    if found.sizes["time"] != fit.sizes["time"]:
+        raise RunFolderError(f"{source}: the fitted motion {made.outcome.message}, before the fit's own end")
+    if _COVARIANCE in fit:
+        covariance = fit[_COVARIANCE].variable.copy()
+        covariance.attrs["covariance_of"] = "attitude"
+        _refuse_other(found, fit, source)
+        found = found.assign({_COVARIANCE: covariance})
+    shown = found.assign_attrs(fit=str(fit.attrs.get("sentence", "")))
+    return ShownRun(Path(source), made.outcome, shown)
+
+
+def _refuse_other(found: xarray.Dataset, fit: xarray.Dataset, source: str) -> None:
+    """Refuse a config that was changed since: its motion would have another uncertainty."""
+    here, there = (normalised(one[QUATERNION].values) for one in (found, fit))
+    apart = np.linalg.norm(vector_of(multiplied(here, conjugated(there))), axis=1)
+    sigma = np.sqrt(np.nan_to_num(np.einsum("tii->t", fit[_COVARIANCE].values), nan=np.inf))
+    worst = int(np.argmax(apart - _SHARE * sigma))
+    if apart[worst] > max(_ROUNDING, _SHARE * sigma[worst]):
+        raise RunFolderError(
+            f"{source}: the motion of fitted.toml is {apart[worst]:.2g} rad from the fit's dataset "
+            f"at {found['time'].values[worst]:.6g} s; was it changed? rigidsim verify {source} checks it"
+        )
+
+
+# --- a fit --------------------------------------------------------------------------------------------------
 
 _ALONG_ROWS = 201
 _AGAIN = f"copy it again from where it is whole, or make the fit again ({FORCE})"

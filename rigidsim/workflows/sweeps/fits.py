@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,16 +19,13 @@ from rigidsim.solve.status import Status
 from rigidsim.store import atomic
 from rigidsim.store.sweeps.saved import FittedOfMembers
 from rigidsim.store.sweeps.tiles import Kept, KeptVariable
-from rigidsim.workflows.fit.fitting import fit_to
+from rigidsim.workflows.fit.fitting import FitResult, fit_to
 from rigidsim.workflows.fit.observations import DataFiles, content, digest
-from rigidsim.workflows.fit.result import FitResult
 from rigidsim.workflows.sweeps.members import OUTCOMES, MemberResults, Outcome, naming_member, status_variable
 
 _NUMBERS = {
     "chi_square": "sum of squares of residuals in sigmas, with the priors'",
     "scale": "residuals in sigmas, root mean square for the numbers that are free",
-}
-_COUNTS = {
     "converged": "1: the fit converged, 0: it didn't, or there is none",
     "undetermined": "directions of the parameters that the data don't determine",
     "freedom": "used numbers less determined parameters",
@@ -179,21 +175,20 @@ def _kept(result: FitResult) -> Kept:
         {"long_name": "covariance with considered numbers; nan if undetermined"}, FITS,
         {**labels, "other_parameter": keys},
     )  # fmt: skip
-    numbers = {"chi_square": result.chi_square, "scale": np.nan if result.scale is None else result.scale}
-    counts = {
-        "converged": result.converged,
+    numbers = {
+        "chi_square": result.chi_square,
+        "scale": np.nan if result.scale is None else result.scale,
+        "converged": int(result.converged),
         "undetermined": len(result.undetermined),
         "freedom": result.freedom,
         "rows": sum(one.used for one in result.data),
         "outliers": len(result.outliers),
         "evaluations": result.evaluations,
     }
-
-    def single(value: Any, words: str) -> KeptVariable:
-        return KeptVariable((), np.array([value]), {"units": "1", "long_name": words}, FITS)
-
-    found |= {name: single(float(numbers[name]), words) for name, words in _NUMBERS.items()}
-    return found | {name: single(np.int64(counts[name]), words) for name, words in _COUNTS.items()}
+    for name, words in _NUMBERS.items():
+        about = {"units": "1", "long_name": words}
+        found[name] = KeptVariable((), np.array([numbers[name]]), about, FITS)
+    return found
 
 
 # --- all of them --------------------------------------------------------------------------------------------

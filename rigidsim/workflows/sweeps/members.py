@@ -59,61 +59,56 @@ def kept(
     return KeptVariable(dims, values, {"units": units, "long_name": long_name, **more}, item)
 
 
-@dataclass(frozen=True)
-class MemberSeries:
-    """Samples of some members: parts of (members, samples, components); missing ones at the end are nan."""
-
-    variable: Variable
-    parts: Sequence[np.ndarray]
-
-    def shaped(self, values: np.ndarray) -> np.ndarray:
-        """Values (members, components) or (members, samples, components) in the variable's own shape."""
-        return values.reshape(*values.shape[:-1], *self.variable.shape)
-
-    @property
-    def drift_of(self) -> str | None:
-        """The invariant whose drift this variable is; None for any other variable."""
-        return self.variable.attributes.get("drift_of")
+Parts = tuple[Variable, Sequence[np.ndarray]]
+"""A variable with its parts: members' samples, (members, samples, components), where missing ones at the end
+are nan; or for each member what was recorded at an event, (times, ...).
+"""
+Occurrences = Iterable[tuple[str, Sequence[np.ndarray], Mapping[str, Parts]]]
+"""Of each event its name, each member's times, and what was recorded then, by name."""
 
 
-def kept_of_series(
-    series: Sequence[MemberSeries],
-    times: np.ndarray,
-    lengths: np.ndarray,
+def _shaped(variable: Variable, values: np.ndarray) -> np.ndarray:
+    """Values (members, components) or (members, samples, components) in the variable's own shape."""
+    return values.reshape(*values.shape[:-1], *variable.shape)
+
+
+def kept_of(
+    sweep: Sweep, series: Sequence[Parts], times: np.ndarray, lengths: np.ndarray, events: Occurrences,
     keep: Collection[str],
-    hidden: str = "",
-) -> Kept:
-    """What is asked for of recorded variables; drifts are always kept. Times in s are (samples,), or
-    (members, samples) if each has its own; ``lengths``: samples that each member has; ``hidden``: what is
-    recorded only for indicators.
+) -> Kept:  # fmt: skip
+    """What is asked for of recorded variables and events; drifts are always kept. Times in s are (samples,),
+    or (members, samples) if each has its own; ``lengths``: samples that each member has.
     """
     found: Kept = {}
-    for one in series:
-        if one.variable.name == GROWTH:
-            found |= _indicators(one, times, keep)
-    series = [one for one in series if one.variable.name != hidden]
-    for one in series:
-        if one.drift_of is not None:
-            found |= _drifts(one, lengths)
+    plain = []
+    for variable, parts in series:
+        if variable.name == GROWTH:
+            found |= _indicators(parts[0], times, keep)
+        if variable.name == sweep.added:  # recorded only for indicators
             continue
-        if "put_back_of" in one.variable.attributes:
-            continue
-        if "final" in keep:
-            found |= _final(one, lengths)
-        if "extremes" in keep:
-            found |= _extremes(one, times)
-        if "means" in keep:
-            found |= _means(one)
-    if "series" in keep:
-        found |= _series(series, times)
+        plain.append((variable, parts))
+        if "drift_of" in variable.attributes:
+            found |= _drifts(variable, parts[0], lengths)
+        elif "put_back_of" not in variable.attributes:
+            if "final" in keep:
+                found |= _final(variable, parts, lengths)
+            if "extremes" in keep:
+                found |= _extremes(variable, parts[0], times)
+            if "means" in keep:
+                found |= _means(variable, parts)
+    if "series" in keep and plain:
+        found |= _series(plain, times)
+    for name, when, points in events:
+        known = {what: values for what, values in points.items() if what != sweep.added}
+        found |= kept_events(name, when, sweep.table.most_events, known, keep)
     return found
 
 
-def _indicators(one: MemberSeries, times: np.ndarray, keep: Collection[str]) -> Kept:
+def _indicators(growth: np.ndarray, times: np.ndarray, keep: Collection[str]) -> Kept:
     """Chaos indicators from the growth of a tangent vector."""
     since = times if times.ndim == 1 else times.T
     way = -1.0 if since.size and (since[-1] < since[0]).any() else 1.0  # growth is that along the run
-    chaos = indicators(way * since, one.parts[0][:, :, 0].T)
+    chaos = indicators(way * since, growth[:, :, 0].T)
     labels = {
         "megno": ("1", "mean exponential growth of nearby orbits: 2 for regular motion", chaos.megno),
         "fli": ("1", "fast Lyapunov indicator: largest logarithm of the growth", chaos.fli),
@@ -135,11 +130,10 @@ def _last(values: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     return np.where((lengths > 0)[:, None], last, np.nan)
 
 
-def _final(one: MemberSeries, lengths: np.ndarray) -> Kept:
-    variable = one.variable
+def _final(variable: Variable, parts: Sequence[np.ndarray], lengths: np.ndarray) -> Kept:
     name = f"{variable.name}_final"
     found = {}
-    for part, values in enumerate(one.parts):
+    for part, values in enumerate(parts):
         attributes = variable.part_attributes(part)
         if part:
             attributes |= {"residual_of": name}
@@ -147,13 +141,12 @@ def _final(one: MemberSeries, lengths: np.ndarray) -> Kept:
         attributes["long_name"] = f"{attributes.get('long_name', variable.name)}, at the last sample"
         attributes.pop("coordinates", None)
         found[part_name(name, part)] = KeptVariable(
-            variable.dims, one.shaped(_last(values, lengths)), attributes, "final"
+            variable.dims, _shaped(variable, _last(values, lengths)), attributes, "final"
         )
     return found
 
 
-def _extremes(one: MemberSeries, times: np.ndarray) -> Kept:
-    variable, values = one.variable, one.parts[0]
+def _extremes(variable: Variable, values: np.ndarray, times: np.ndarray) -> Kept:
     found = {}
     units = variable.attributes.get("units", "1")
     for what, filled, place in (("min", np.inf, np.argmin), ("max", -np.inf, np.argmax)):
@@ -165,62 +158,56 @@ def _extremes(one: MemberSeries, times: np.ndarray) -> Kept:
         long_name = f"{words} {variable.attributes.get('long_name', variable.name)} at a sample"
         common = {k: v for k, v in variable.attributes.items() if k in ("frame", "euler_sequence", "angle")}
         found[f"{variable.name}_{what}"] = kept(
-            one.shaped(extreme), units, long_name, "extremes", variable.dims, **common
+            _shaped(variable, extreme), units, long_name, "extremes", variable.dims, **common
         )
         found[f"{variable.name}_{what}_time"] = kept(
-            one.shaped(when), "s", f"time of the {long_name}", "extremes", variable.dims
+            _shaped(variable, when), "s", f"time of the {long_name}", "extremes", variable.dims
         )
     return found
 
 
-def _means(one: MemberSeries) -> Kept:
-    variable = one.variable
-    present = ~np.isnan(one.parts[0])
+def _means(variable: Variable, parts: Sequence[np.ndarray]) -> Kept:
+    present = ~np.isnan(parts[0])
     count = np.maximum(present.sum(axis=1), 1)
     # in the order of the samples: ``sum`` takes another order if a member is alone in its block
-    total = sum(np.cumsum(np.where(present, part, 0), axis=1)[:, -1] for part in reversed(one.parts))
+    total = sum(np.cumsum(np.where(present, part, 0), axis=1)[:, -1] for part in reversed(parts))
     mean = np.where(present.any(axis=1), total / count, np.nan)
     units = variable.attributes.get("units", "1")
     long_name = f"mean of the {variable.attributes.get('long_name', variable.name)} over the samples"
-    return {f"{variable.name}_mean": kept(one.shaped(mean), units, long_name, "means", variable.dims)}
+    return {f"{variable.name}_mean": kept(_shaped(variable, mean), units, long_name, "means", variable.dims)}
 
 
-def _drifts(one: MemberSeries, lengths: np.ndarray) -> Kept:
-    values = one.parts[0]
+def _drifts(variable: Variable, values: np.ndarray, lengths: np.ndarray) -> Kept:
     size = np.abs(values[:, :, 0])
     largest = np.where(lengths > 0, np.fmax.reduce(size, axis=1, initial=0.0), np.nan)
     of_a_member = ("coordinates", "scale", "scale_units")
-    attributes = {k: v for k, v in one.variable.attributes.items() if k not in of_a_member}
-    named = one.variable.attributes.get("long_name", one.variable.name)
+    attributes = {k: v for k, v in variable.attributes.items() if k not in of_a_member}
+    named = variable.attributes.get("long_name", variable.name)
     return {
-        f"{one.variable.name}_largest": KeptVariable(
+        f"{variable.name}_largest": KeptVariable(
             (), largest, {**attributes, "long_name": f"largest {named} at a sample, without its sign"}
         ),
-        f"{one.variable.name}_final": KeptVariable(
+        f"{variable.name}_final": KeptVariable(
             (), _last(values, lengths)[:, 0], {**attributes, "long_name": f"{named} at the last sample"}
         ),
     }
 
 
-def _series(series: Sequence[MemberSeries], times: np.ndarray) -> Kept:
+def _series(series: Sequence[Parts], times: np.ndarray) -> Kept:
     found: Kept = {}
-    for one in series:
-        for part, values in enumerate(one.parts):
-            attributes = {k: v for k, v in one.variable.part_attributes(part).items() if k != "coordinates"}
-            found[part_name(one.variable.name, part)] = KeptVariable(
-                ("sample", *one.variable.dims), one.shaped(values), attributes, "series"
+    for variable, parts in series:
+        for part, values in enumerate(parts):
+            attributes = {k: v for k, v in variable.part_attributes(part).items() if k != "coordinates"}
+            found[part_name(variable.name, part)] = KeptVariable(
+                ("sample", *variable.dims), _shaped(variable, values), attributes, "series"
             )
     rows = np.broadcast_to(times, (len(next(iter(found.values())).values), times.shape[-1]))
     found["time"] = kept(np.array(rows), "s", "time of the scene", "series", ("sample",))
     return found
 
 
-Points = Mapping[str, tuple[Variable, Sequence[np.ndarray]]]
-"""Values recorded at events by name: for each member (times, ...)."""
-
-
 def kept_events(
-    name: str, times: Sequence[np.ndarray], most: int, points: Points, keep: Collection[str]
+    name: str, times: Sequence[np.ndarray], most: int, points: Mapping[str, Parts], keep: Collection[str]
 ) -> Kept:
     """How often an event happened and when (s); only the first times that fit are kept."""
     count = len(times)
@@ -416,26 +403,24 @@ def failed(outcome: Outcome, reason: str) -> MemberResults:
 
 
 def _kept_of_run(sweep: Sweep, result: MemoryRun, keep: Sequence[str]) -> Kept:
-    found: Kept = {}
     named = {variable.name: variable for variable in result.variables}
     shown = [v for v in named.values() if "units" in v.attributes and v.name not in ("time", *_DATES)]
+    series, times = list[Parts](), np.zeros(0)
     if result.blocks:
         times = joined_parts(result.blocks, named["time"])[0].reshape(-1)
-        series = [
-            MemberSeries(v, [part.reshape(1, len(times), -1) for part in joined_parts(result.blocks, v)])
-            for v in shown
-        ]
-        found |= kept_of_series(series, times, np.array([len(times)]), keep, sweep.added)
+        for variable in shown:
+            parts = joined_parts(result.blocks, variable)
+            series.append((variable, [part.reshape(1, len(times), -1) for part in parts]))
     extras = {extra.name: extra.values for extra in result.extras}
-    for event in sweep.base.config.events:
-        points = {
-            v.name: (v, [extras[f"{event.name}_{v.name}"]])
-            for v in shown
-            if f"{event.name}_{v.name}" in extras and v.name != sweep.added
-        }
-        when = [extras[f"{event.name}_time"]]
-        found |= kept_events(event.name, when, sweep.table.most_events, points, keep)
-    return found
+
+    def occurrences() -> Occurrences:
+        for event in sweep.base.config.events:
+            points = {
+                v.name: (v, [at]) for v in shown if (at := extras.get(f"{event.name}_{v.name}")) is not None
+            }
+            yield event.name, [extras[f"{event.name}_time"]], points
+
+    return kept_of(sweep, series, times, np.array([len(times)]), occurrences(), keep)
 
 
 _ONE_BY_ONE = ("frequencies",)
@@ -568,7 +553,7 @@ class BatchTiles:
     ) -> MemberResults:  # fmt: skip
         """Results of those members of a block that are ``done``."""
         sweep = self._sweep
-        kept = _kept(block, variables, keep, sweep.table.most_events, sweep.added)
+        kept = _kept_of_block(sweep, block, variables, keep)
         over = block.largest_drifts().max(axis=0) > block.drift_bound
         warned = {WarningCode.DRIFT: over, WarningCode.UNDEFINED: _lost(block)}
         if errors is not None:
@@ -606,35 +591,25 @@ def _lost(block: BatchBlock) -> np.ndarray:
     return found
 
 
-def _kept(
-    block: BatchBlock,
-    variables: Sequence[Variable],
-    keep: Sequence[str],
-    most_events: int,
-    hidden: str,
+def _kept_of_block(
+    sweep: Sweep, block: BatchBlock, variables: Sequence[Variable], keep: Sequence[str]
 ) -> Kept:
-    series, recorded = [], {}
-    for variable in variables:
-        if variable.name in block.values:
-            values = np.moveaxis(block.values[variable.name], 0, 1)
-            recorded[variable.name] = variable
-        elif variable.name in block.drifts:
-            values = block.drifts[variable.name].T[:, :, None]
-        else:
-            continue
-        series.append(MemberSeries(variable, [values]))
-    kept = kept_of_series(series, block.times, block.reached, keep, hidden)
-    recorded = {name: variable for name, variable in recorded.items() if name != hidden}
-    for event in block.events:
-        edges = np.searchsorted(event.member, np.arange(len(block.members) + 1))
-        times = [event.time[a:b] for a, b in pairwise(edges)]
-        points: Points = {
-            name: (recorded[name], [values[a:b] for a, b in pairwise(edges)])
-            for name, values in event.values.items()
-            if name in recorded
-        }
-        kept |= kept_events(event.name, times, most_events, points, keep)
-    return kept
+    named = {variable.name: variable for variable in variables}
+    values = {name: np.moveaxis(x, 0, 1) for name, x in block.values.items()}
+    values |= {name: x.T[:, :, None] for name, x in block.drifts.items()}
+    series = [(variable, [values[name]]) for name, variable in named.items() if name in values]
+
+    def occurrences() -> Occurrences:
+        for event in block.events:
+            edges = [*pairwise(np.searchsorted(event.member, np.arange(len(block.members) + 1)))]
+            points = {
+                name: (named[name], [x[a:b] for a, b in edges])
+                for name, x in event.values.items()
+                if name in named and name in block.values
+            }
+            yield event.name, [event.time[a:b] for a, b in edges], points
+
+    return kept_of(sweep, series, block.times, block.reached, occurrences(), keep)
 
 
 _MOST_TRIED = 1000  # members among which there has to be one that can be run

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from rigidsim.errors import ConfigError, Problem, Remedy
@@ -15,7 +15,7 @@ from rigidsim.solve.lanes import recommended_width
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.summary import SummaryPart
 from rigidsim.store.sweeps.tiles import OF_FITS, RESERVED, SUFFIXES
-from rigidsim.workflows.fit.keys import FitKeys
+from rigidsim.workflows.fit.predictions import FitKeys
 from rigidsim.workflows.plan import RunPlan, plan
 from rigidsim.workflows.sweeps.members import batches_of, first_possible, markable, recording, why_alone
 
@@ -31,10 +31,6 @@ _MOST_SHOWN = 10
 _AT_ONCE = 4096
 QUICK = 1_000_000
 """Up to this many members are all checked for a plan; a sweep checks all."""
-Share = tuple[list[int], int]
-Each = Callable[
-    [Callable[[tuple[str, str, int, int]], Share], list[tuple[str, str, int, int]]], Iterable[Share]
-]
 
 _SECONDS_OF_A_TILE, _LEAST_SECONDS = 5.0, 2.0
 _SHARE_OF_A_TILE = 32
@@ -52,16 +48,16 @@ _BATCH_SECONDS = 2e-5  # seconds of overhead per member of a batch besides its i
 _ESTIMATED = 2.5  # cost ratio of a batch member with estimated errors to one without
 
 
-def check_sweep(sweep: Sweep, *, each: Each = map, most: float = math.inf) -> InitialValueProblem:
+def check_sweep(sweep: Sweep, *, most: float = math.inf) -> InitialValueProblem:
     """Refuse a sweep with a member that can't be run, by ``ConfigError`` with members and keys; returns the
     first that can, prepared. To check the numbers of more than ``_ALL`` takes a second per million members of
-    a product, most of a minute where each has values of its own; ``each`` may, like ``map``, have others look
-    at shares of them meanwhile. Of more than ``most`` members some are checked.
+    a product, most of a minute where each has values of its own. Of more than ``most`` members some are
+    checked.
     """
     _refuse_names(sweep)
     first = prepare(sweep.worked_out(first_possible(sweep)))
     refuse_taken_names(first)
-    problems = _problems(sweep, each, most) if sweep.table.impossible != "mark" else []
+    problems = _problems(sweep, most) if sweep.table.impossible != "mark" else []
     if len(problems) >= _MOST_SHOWN:
         problems.append(Problem("[sweep]", "there may be more members of this kind; these came first"))
     if problems:
@@ -69,19 +65,22 @@ def check_sweep(sweep: Sweep, *, each: Each = map, most: float = math.inf) -> In
     return first
 
 
-def _problems(sweep: Sweep, each: Each, most: float) -> list[Problem]:
-    given = _shares(sweep, each) if sweep.count <= most else []  # others begin with them at once
+def _problems(sweep: Sweep, most: float) -> list[Problem]:
     if problems := _worked_out(sweep, _FEWER):
         return problems
-    refused, accepted = list[int](), 0
-    for refused, some in given:  # up to a share that says so of none
+    # members that share equations are judged by their numbers alone, up to a block of which none does
+    shared = sweep.count <= most and why_alone(sweep, ()) in ("", "wall_time", "asked")
+    accepted = 0
+    for first in range(0, sweep.count if shared else 0, _AT_ONCE):
+        block = range(first, min(first + _AT_ONCE, sweep.count))
+        batches = batches_of(sweep.experiment.text, sweep.experiment.source)
+        refused, some = batches.refused(block, _MOST_SHOWN)
+        if refused:
+            blamed = [sweep.with_member_named(one, refused[one]) for one in sorted(refused)[:_MOST_SHOWN]]
+            return [problem for error in blamed for problem in error.problems]
         accepted += some
-        if refused or not some:
+        if not some:
             break
-    if refused:
-        errors, _ = batches_of(sweep.experiment.text, sweep.experiment.source).refused(refused)
-        blamed = [sweep.with_member_named(member, errors[member]) for member in refused if member in errors]
-        return [problem for error in blamed for problem in error.problems]
     if accepted == sweep.count:
         return []
     return _worked_out(sweep, _OF_AN_AXIS, equations=sweep.count <= _ALL and not sweep.fits)
@@ -104,22 +103,6 @@ def _worked_out(sweep: Sweep, most: int, *, equations: bool = False) -> list[Pro
             if len(problems) >= _MOST_SHOWN:
                 break
     return problems
-
-
-def _shares(sweep: Sweep, each: Each) -> Iterable[Share]:
-    """Which members no run accepts, if members share equations so that their numbers alone decide."""
-    if why_alone(sweep, ()) not in ("", "wall_time", "asked"):
-        return []
-    edges = [*range(0, sweep.count, _AT_ONCE), sweep.count]
-    text, source = sweep.experiment.text, sweep.experiment.source
-    return each(refused_of, [(text, source, *ends) for ends in itertools.pairwise(edges)])
-
-
-def refused_of(share: tuple[str, str, int, int]) -> Share:
-    """Of a share (config, source, first, stop): members no run accepts, and how many can be run together."""
-    config, source, begin, end = share
-    refused, accepted = batches_of(config, source).refused(range(begin, end), _MOST_SHOWN)
-    return sorted(refused)[:_MOST_SHOWN], accepted
 
 
 def _tried(sweep: Sweep, most: int) -> Iterator[int]:

@@ -1,1 +1,0 @@
-"""What a scene requires: what each effect is worth over its span, and the least model within an error."""
