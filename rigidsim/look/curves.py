@@ -27,9 +27,8 @@ _VISIBLE = 0.01  # of its start, from which a change is seen on an axis from zer
 _QUICK = np.deg2rad(1.0)  # a day, from which a node's motion is shown in the axis' own unit
 _LEGIBLE = 0.01  # of an angle, from which the ticks along its swing need four digits at most
 _AS_FAR = 0.7  # of the whole swing: what a straight line must leave of it to be of no help
-_STEEP = 1.5  # rad of pitch, near which roll and yaw are ill-defined
 _ROUNDING = 1e-11  # of rates, below which their difference is rounding
-_DECADES = 3.0  # by which a rate falls, from which its axis is logarithmic
+_DECADES = 1.0  # by which a rate or an angle falls, from which its axis is logarithmic
 _LOOPS, _WINDOW = 3, 8  # of a long fast path that are shown bright; times as many, that a plot shows
 _AXES = {"figure": "blue", "spin": "orange", "momentum": "violet"}
 STATES = tuple(f"states_{place}" for place in range(3))
@@ -87,7 +86,7 @@ def attitude(dataset: xarray.Dataset) -> Found:
             "sparse": sparse,
             "hues": XYZ,
         }
-        return None if table is None else (table, {**options, "labels": ("Z on X", "on Y", "on Z")})
+        return None if table is None else (table, {**options, "labels": ("X", "Y", "Z")})
     labels = ["φ", "θ", "ψ"]
     for k, symbol in enumerate(labels):
         if not wrapped and np.ptp(signals.finite_rows(angles)[:, k]) > 2 * _TURN:
@@ -184,8 +183,7 @@ def swings(dataset: xarray.Dataset) -> tuple[Array, dict[str, Any]] | None:
 def regular(dataset: xarray.Dataset) -> tuple[Array, dict[str, Any]] | None:
     """Roll, pitch and yaw where roll and yaw are defined: pitch stays away from a right angle."""
     table = signals.values(dataset, "roll_pitch_yaw", 3)
-    defined = table is not None and np.nanmax(np.abs(table[:, 1])) < _STEEP
-    return (table, {"labels": ("roll", "pitch", "yaw")}) if table is not None and defined else None
+    return None if table is None or sources.steep(table) else (table, {"labels": ("roll", "pitch", "yaw")})
 
 
 def tilt(dataset: xarray.Dataset) -> Found:
@@ -258,7 +256,12 @@ def loop_rows(swing: Array) -> int:
 def pointing(dataset: xarray.Dataset) -> Found:
     """How far a body axis points away from where the air or the light comes from."""
     found = sources.pointing_angle(dataset)
-    return None if found is None else (found[2], {"more": f"{found[0]} axis and {found[1]}"})
+    if found is None:
+        return None
+    axis, towards, angle = found
+    part = -(-len(angle) // 10)  # whose means differ less than single values of what swings
+    falls = bool(np.nanmean(angle[:part]) > 10**_DECADES * np.nanmean(angle[-part:]))
+    return angle, {"more": f"{axis} axis and {towards}", "log": falls, "from_zero": not falls}
 
 
 def locked_longitude(dataset: xarray.Dataset) -> Array | None:
@@ -336,7 +339,7 @@ def own_states(place: int) -> Curve:
         if place >= len(groups):
             return None
         unit, columns = groups[place]
-        title = "Own states" if len(columns) > 1 else f"Own state {next(iter(columns))}"
+        title = "User-defined states" if len(columns) > 1 else f"User-defined state {next(iter(columns))}"
         return np.stack([*columns.values()], axis=1), {"title": title, "labels": [*columns], "of": unit}
 
     return row(f"own states {place}", "", found, word="value", begins=True)
@@ -389,7 +392,7 @@ CURVES: dict[str, Curve] = {
         hues=("violet", "orange"),
     ),
     "spin_down": row(
-        "spin", "Size of the angular velocity", spin_down, of="rad/s", word="|ω|", log=True
+        "spin", "Size of the angular velocity", spin_down, of="rad/s", word="|ω|", log=True, begins=True
     ),
     "polar_motion": row(
         "polar_motion", "Polar motion: the spin axis seen from the figure axis", signals.polar_motion,
@@ -420,9 +423,7 @@ CURVES: dict[str, Curve] = {
         labels=("inclination less its mean", "node less its mean motion, × sin(inclination)"),
         hues=("orange", "violet"),
     ),
-    "pointing": row(
-        "pointing", "Angle between the body's ", pointing, begins=True, from_zero=True
-    ),
+    "pointing": row("pointing", "Angle between the body's ", pointing, begins=True),
     "locking": row(
         "locking", "The point under the source, until the rotation is locked", locking, of="", unit="turns",
         word="longitude",

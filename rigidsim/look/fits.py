@@ -4,8 +4,11 @@ Pictures and ``rigidsim analyse`` thus have one source of rates and periods. Sam
 (few, uneven, with gaps) have a straight line taken off, whose rate is only said to be about right.
 """
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import xarray
@@ -14,6 +17,7 @@ from rigidsim.analysis.analyse import analyse_dataset
 from rigidsim.analysis.result import SignalAnalysis, SpectralLine
 from rigidsim.errors import RigidsimError
 from rigidsim.look.solids import Array
+from rigidsim.scene.readable import period_text
 
 _TURN = 2 * np.pi
 _LINES = 6  # that free a rate from swings to more digits than pictures show
@@ -23,14 +27,15 @@ _LEAST_CYCLES = 1.5  # of a swing that an ellipse is drawn of
 
 @dataclass(frozen=True)
 class SecularLine:
-    """The secular part of an angle, ``value + rate * (t - middle)``; `known` unless it is a straight line
-    through samples that can't be analysed.
+    """The secular part of an angle, ``value + rate * (t - middle)``; `known`, with the rate's `error`, unless
+    it is a straight line through samples that can't be analysed.
     """
 
     value: float
     rate: float
     middle: float
     known: bool
+    error: float = 0.0
 
     def at(self, time: Array) -> Array:
         """Values (rows,) at given times."""
@@ -42,13 +47,22 @@ class SecularLine:
         return "" if self.known else "about "
 
 
+def turn_text(mean: SecularLine, attributes: Mapping[str, Any]) -> str:
+    """The time that a mean motion needs for a turn, to at most five digits, as many as its error leaves."""
+    sure = abs(mean.rate) / max(mean.error, 1e-9 * abs(mean.rate))
+    digits = int(np.clip(math.log10(max(sure, 1.0)), 2, 5))
+    return mean.about + period_text(_TURN / abs(mean.rate), attributes, digits)
+
+
 def secular(time: Array, angle: Array) -> SecularLine:
     """The secular part of an angle (rows,), rad, that swings about it, at times in s."""
     found = _analysed(time, angle)
     if found is not None:
         rows = _even(time)
         middle = (time[rows][0] + time[rows][-1]) / 2
-        return SecularLine(float(found.value.real), float(found.rate.real), float(middle), True)
+        return SecularLine(
+            float(found.value.real), float(found.rate.real), float(middle), True, found.rate_error
+        )
     finite = np.isfinite(angle)
     t, y = time[finite], angle[finite]
     if len(t) < 3 or t[-1] == t[0]:
@@ -80,7 +94,8 @@ def _analysis_of(time: bytes, angle: bytes) -> SignalAnalysis | None:
 
 
 def circulation(time: Array, plane: Array) -> SecularLine | None:
-    """The mean motion of a point of a plane (rows, 2) about the origin; counterclockwise > 0.
+    """The mean motion of a point of a plane (rows, 2) about the origin; counterclockwise > 0. Its error is
+    what a narrower window makes of it.
 
     None if it doesn't go round, completes less than one turn, keeps speeding up or slowing down, or was
     sampled too sparsely to decide.
@@ -94,12 +109,23 @@ def circulation(time: Array, plane: Array) -> SecularLine | None:
     angle = phase[0] + np.concatenate([[0.0], np.cumsum(steps)])
     if abs(angle[-1] - angle[0]) < 0.95 * _TURN:
         return None
-    half = len(angle) // 2
-    rates = [secular(time[finite][part], angle[part]).rate for part in (slice(half), slice(half, None))]
+    time, half = time[finite], len(angle) // 2
+    rates = [_mean_rate(time[part], angle[part]) for part in (slice(half), slice(half, None))]
     if abs(rates[0] - rates[1]) > _UNIFORM * max(map(abs, rates)):
         return None
-    found = secular(time[finite], angle)
-    return found if found.rate else None
+    rate, narrower = _mean_rate(time, angle), _mean_rate(time, angle, 2.0)
+    middle = (time[0] + time[-1]) / 2
+    value = float(np.mean(angle - rate * (time - middle)))
+    return SecularLine(value, rate, float(middle), True, abs(rate - narrower)) if rate else None
+
+
+def _mean_rate(time: Array, angle: Array, power: float = 1.0) -> float:
+    """The mean rate of an angle that swings about its mean motion, weighted by a bump function: the swings'
+    share falls faster than any power of their number (Das & Yorke 2018, Nonlinearity 31, 491).
+    """
+    place = ((time[1:] + time[:-1]) / 2 - time[0]) / (time[-1] - time[0])
+    weight = np.exp(-power / (place * (1 - place)))
+    return float(weight @ np.diff(angle) / (weight @ np.diff(time)))
 
 
 @dataclass(frozen=True)

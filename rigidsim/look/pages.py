@@ -1,22 +1,33 @@
 """What a scene is about: the curves and planes shown first, its numbers in words, and pages of text."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import xarray
 
 from rigidsim.look import gyrostats, signals, sources
-from rigidsim.look.curves import CURVES, STATES, orientations, precesses
-from rigidsim.look.fits import circulation, secular
+from rigidsim.look.curves import CURVES, STATES, orientations, plotted, precesses
+from rigidsim.look.fits import circulation, secular, turn_text
+from rigidsim.look.plots import Plot
 from rigidsim.look.record import scene_of
 from rigidsim.look.signals import title_of
 from rigidsim.look.solids import Array
-from rigidsim.scene.readable import TimeWords, angle_text, span_text, turning_text
+from rigidsim.scene.readable import TimeWords, angle_text, period_text, turning_text, typeset
 
 Names = list[str]
+_TURN = 2 * np.pi
 _STEADY = 0.3  # of the largest rate, above which a body is said to turn at its mean rate
 _LEAST = 1e-9  # rad, of a longitude's advance, below which it is rounding
+_PARTS, _SLOWER = 10, 1.5  # parts of a run whose mean rates differ so many times: it spins up or down
+_AT_REST = 1e-3  # of its largest rate, below which a body doesn't turn
+_REGULAR = 0.05  # by which swings may differ that have one period
+_FROM_TO = {
+    "tilt": "tilt", "wobble": "nutation angle", "pointing": "pointing error", "roll_pitch_yaw": "{}",
+    "libration": "libration {}", "rotor_tilts": "rotor {}, axis from the momentum", "rotor_rates": "rotor {}",
+    "braking": "remaining {}", "core_axis": "core axis from the mantle's",
+}  # fmt: skip
+"""Names of curves, and what their numbers are called."""
 _GLYPHS = (
     (0x20, 0x7E), (0xA0, 0x148), (0x14A, 0x1C3), (0x1C5, 0x31E), (0x384, 0x38A), (0x38E, 0x3A1),
     (0x3A3, 0x3E1), (0x3F0, 0x49D), (0x4A0, 0x4FF), (0x1E00, 0x1EFF), (0x2000, 0x200A), (0x2010, 0x2027),
@@ -103,64 +114,113 @@ def leading(rows: xarray.Dataset) -> tuple[Names, Names]:
 
 
 def numbers(rows: xarray.Dataset) -> list[tuple[str, str]]:
-    """The motion's own numbers: names and texts of periods, rates of precession, ranges of tilts."""
+    """The motion's own numbers: names and texts of periods, rates of precession, ranges of angles."""
+    if rows.sizes["time"] < 3:
+        return []
+    return [*_periods(rows), *_precession(rows), *_ranges(rows)]
+
+
+def _periods(rows: xarray.Dataset) -> list[tuple[str, str]]:
+    """How long the body takes to turn, to flip, and to go round what it goes round."""
     found: list[tuple[str, str]] = []
     seconds, rates = signals.seconds(rows), signals.values(rows, "angular_velocity", 3)
-    if len(seconds) < 3:
-        return found
     size = np.zeros(1) if rates is None else signals.norms(signals.finite_rows(rates))
-    if rates is not None and len(size) and size.min() > _STEADY * size.max():
-        found.append(("turns once in", span_text(2 * np.pi / float(size.mean()), 5)))
-        flips = _flips(seconds, signals.finite_rows(rates))
-        found += [("between flips", span_text(flips, 4))] if flips else []
-    plane = (
-        signals.polar_motion(rows) if signals.near_axis(rows) and not signals.wobble_aliased(rows) else None
-    )
-    wobbling = None if plane is None else circulation(seconds, plane)
-    if wobbling is not None:
-        found.append(
-            ("polar motion once round in", wobbling.about + span_text(2 * np.pi / abs(wobbling.rate), 5))
-        )
-    precessing = signals.values(rows, "precession_angle")
-    if precessing is not None:
-        found.append(("precession", turning_text(secular(seconds, precessing).rate)))
-    elif precesses(rows):
-        name, (_, node) = next(iter(orientations(rows).items()))
-        mean = secular(seconds, node)
-        stray = float(np.nanmax(np.abs(node - mean.at(seconds))))
-        if mean.known and abs(mean.rate) * np.ptp(seconds) > max(stray, _LEAST):
-            found.append((f"{name} axis precesses in", mean.about + span_text(2 * np.pi / abs(mean.rate), 4)))
-    for name, words in (("tilt", "tilt"), ("nutation_angle", "nutation angle"), ("obliquity", "obliquity")):
-        table = signals.values(rows, name)
-        if table is not None and np.isfinite(table).any():
-            column = table if table.ndim == 1 else table[:, 0]
-            found.append((words, _range(column)))
-    pointing = sources.pointing_angle(rows)
-    if pointing is not None:
-        axis, towards, angle = pointing
-        found.append(
-            (f"{axis} axis from {towards}", f"{angle_text(angle[0])}, at the end {angle_text(angle[-1])}")
-        )
-    librating = signals.values(rows, "libration", 2)
-    if librating is not None:
-        swing = librating - np.pi * np.round(np.nanmean(librating, axis=0) / np.pi)
-        found.append(("largest libration", angle_text(float(np.nanmax(np.abs(swing))))))
+    if rates is not None and len(size) and size.min() > _AT_REST * size.max():
+        part = -(-len(size) // _PARTS)
+        shown = [float(one.mean()) for one in (size, size[:part], size[-part:])]
+        shown += [float(size.max()), float(size.min())]
+        mean, first, last, fast, slow = (period_text(_TURN / one, rows.attrs) for one in shown)
+        text = mean if size.min() > _STEADY * size.max() else f"{fast} to {slow}"
+        slower = max(shown[1:3]) > _SLOWER * min(shown[1:3])
+        found.append(("turns once in", f"{first}, at the end {last}" if slower else text))
+        if signals.energy_and_momentum(rows) is not None and len(rates) == len(seconds):
+            flips = np.diff(_passes(seconds, rates @ rates[0]))
+            found += [("between flips", period_text(float(flips.mean()), rows.attrs))] if len(flips) else []
+    elif (turns := signals.values(rows, "quaternion", 4)) is not None:
+        angle = 2 * np.arccos(min(abs(float(turns[0] @ turns[-1])), 1.0))
+        found.append(("turned between start and end by", angle_text(angle)))
+    for words, plane in _circling(rows):
+        round_once = None if plane is None else circulation(seconds, plane)
+        if round_once is not None:
+            found.append((words, turn_text(round_once, rows.attrs)))
     return found
 
 
-def _range(angle: Array) -> str:
-    low, high = float(np.nanmin(angle)), float(np.nanmax(angle))
-    texts = [angle_text(x, 6, like=high) for x in (low, high)]
-    return texts[0] if texts[0] == texts[1] else " to ".join(texts)
+def _circling(rows: xarray.Dataset) -> Iterator[tuple[str, Array | None]]:
+    """Names of periods, and what goes round the origin once in each, as points of a plane (rows, 2)."""
+    free, rates = signals.energy_and_momentum(rows), signals.principal_rates(rows)
+    if signals.near_axis(rows) and not signals.is_top(rows):
+        yield (
+            "polar motion once round in",
+            None if signals.wobble_aliased(rows) else signals.polar_motion(rows),
+        )
+    elif free is not None and rates is not None:
+        moments, twice, square = free
+        least, middle, most = np.argsort(moments)
+        k = most if square > twice * moments[middle] else least  # the axis that the polhode is about
+        yield "polhode once round in", None if signals.wobble_aliased(rows) else np.delete(rates, k, axis=1)
+    along, axis = signals.steady_momentum(rows), signals.pole(rows, "figure")
+    if along is not None and axis is not None and not signals.aliased(rows):
+        yield (
+            "figure axis round the momentum in",
+            np.stack([axis @ one for one in signals.across(along)], axis=1),
+        )
+    position = signals.values(rows, "position", 3)
+    if position is not None and (scene_of(rows).attractors or scene_of(rows).sources):
+        normal = np.nanmean(np.cross(position[:-1], position[1:]), axis=0)
+        if normal.any():
+            one, other = signals.across(normal / np.linalg.norm(normal))
+            yield "orbit once round in", np.stack([position @ one, position @ other], axis=1)
 
 
-def _flips(seconds: Array, rates: Array) -> float:
-    """Mean time (s) between changes of sign of the rate that the body begins with; 0 with fewer than two."""
-    if len(rates) != len(seconds):
-        return 0.0
-    along = rates @ (rates[0] / (np.linalg.norm(rates[0]) or 1.0))
-    changes = seconds[1:][np.diff(np.signbit(along))]
-    return float(abs(changes[-1] - changes[0])) / (len(changes) - 1) if len(changes) > 1 else 0.0
+def _precession(rows: xarray.Dataset) -> list[tuple[str, str]]:
+    """The rate of a top about the vertical, or the period and the tilt with which a body's axis precesses."""
+    seconds, angle = signals.seconds(rows), signals.values(rows, "precession_angle")
+    if angle is not None:
+        return [("precession", turning_text(secular(seconds, angle).rate))]
+    follows = sources.librates(rows) and CURVES["latitude_libration"](rows) is None  # its orbit
+    if not precesses(rows) or follows or signals.is_top(rows) or sources.pointing_angle(rows) is not None:
+        return []
+    name, (tilt, node) = next(iter(orientations(rows).items()))
+    mean, found = secular(seconds, node), []
+    stray = float(np.nanmax(np.abs(node - mean.at(seconds))))
+    if mean.known and abs(mean.rate) * np.ptp(seconds) > max(stray, _LEAST):
+        found = [(f"{name} axis precesses in", turn_text(mean, rows.attrs))]
+    if found or "obliquity" in rows:
+        found += _from_to(rows, "obliquity", plotted(rows, "obliquity", "", tilt))
+    return found
+
+
+def _ranges(rows: xarray.Dataset) -> list[tuple[str, str]]:
+    """From where to where the leading angles and rates of rotors go, and how much of a rotation remains."""
+    names = [name for name in leading(rows)[0] if name in _FROM_TO]
+    return [one for name in names for one in _from_to(rows, _FROM_TO[name], CURVES[name](rows))]
+
+
+def _from_to(rows: xarray.Dataset, words: str, plot: Plot | None) -> Iterator[tuple[str, str]]:
+    """Extremes of each curve of a plot, and how long it takes to swing between them and back; the first and
+    last value of one that goes one way.
+    """
+    for column, label in zip(plot.values.T, plot.labels, strict=False) if plot else ():
+        values = column[np.isfinite(column)]
+        if not len(values):
+            continue
+        ends, every = (min(values), max(values)), ""
+        passes = _passes(signals.seconds(rows)[np.isfinite(column)], values - sum(ends) / 2)
+        swings = np.diff(passes[::2])
+        if len(passes) == 1:
+            ends = values[0], values[-1]
+        elif len(swings) > 1 and np.std(swings) < _REGULAR * np.mean(swings):
+            every = f", every {period_text(float(swings.mean()), rows.attrs, 4)}"
+        texts = dict.fromkeys(typeset(float(x), 4) for x in ends)
+        yield words.format(label), f"{' to '.join(texts)} {plot.unit}".strip() + every * (len(texts) > 1)
+
+
+def _passes(seconds: Array, values: Array) -> Array:
+    """Times (s) at which a curve passes zero, along straight lines between rows."""
+    k = np.flatnonzero(np.diff(np.signbit(values)))
+    share = values[k] / (values[k] - values[k + 1])
+    return np.asarray(seconds[k] + share * (seconds[k + 1] - seconds[k]))
 
 
 def summary_page(dataset: xarray.Dataset, thinned: xarray.Dataset) -> str:

@@ -12,7 +12,7 @@ from rigidsim.look.curves import precesses
 from rigidsim.look.record import scene_of
 from rigidsim.look.solids import Array
 from rigidsim.look.states import events_of
-from rigidsim.scene.readable import angle_text, scaled, span_text, with_unit
+from rigidsim.scene.readable import angle_text, period_text, scaled, span_text, with_unit
 
 _TURN = 2 * np.pi
 _SMALL = 0.05  # rad: sines of smaller angles read as angles
@@ -73,13 +73,13 @@ def planar(
     return Path(name, title, plane / divisor, across, up, unit, others=beside, **options)
 
 
-def once_round(dataset: xarray.Dataset, plane: Array, digits: int) -> str:
+def once_round(dataset: xarray.Dataset, plane: Array) -> str:
     """Words on the period and the sense in which a point goes round the origin; empty if it doesn't."""
     mean = fits.circulation(signals.seconds(dataset), plane)
     if mean is None:
         return ""
     way = "counterclockwise" if mean.rate > 0 else "clockwise"
-    return f": once round in {mean.about}{span_text(_TURN / abs(mean.rate), digits)}, {way}"
+    return f": once round in {fits.turn_text(mean, dataset.attrs)}, {way}"
 
 
 def polar_motion(dataset: xarray.Dataset) -> Path | None:
@@ -90,7 +90,7 @@ def polar_motion(dataset: xarray.Dataset) -> Path | None:
     sparse, radius = signals.wobble_aliased(dataset), signals.norms(plane)
     least, most = float(np.nanmin(radius)), float(np.nanmax(radius))
     reach = f"{angle_text(least, like=most)} to " if most - least > 1e-3 * most else ""
-    words = "" if sparse else once_round(dataset, plane, 5)
+    words = "" if sparse else once_round(dataset, plane)
     title = f"Polar motion{words}, {reach}{angle_text(most)}"
     return planar("polar_motion", title, plane, "m₁", "m₂", hue="pink", center="figure axis", sparse=sparse)
 
@@ -119,7 +119,7 @@ def pole_path(dataset: xarray.Dataset) -> Path | None:
     reach = max(float(np.nanmax(np.abs(shown - np.nanmean(shown, axis=0)))), 1e-300)
     others = {f"{n} axis": p for n, p in paths.items() if not np.nanmax(np.abs(p - shown)) < _SAME * reach}
     sparse = along is not None and signals.aliased(dataset)
-    title = f"Path of {title} in space" + ("" if sparse else once_round(dataset, shown, 4))
+    title = f"Path of {title} in space" + ("" if sparse else once_round(dataset, shown))
     if np.nanmin(signals.norms(shown)) > 3 * reach:  # so far that it would press the path flat
         center = ""
     return planar("pole_path", title, shown, *names, center=center, others=others, sparse=sparse)
@@ -148,7 +148,7 @@ def nutation(dataset: xarray.Dataset) -> Path | None:
     ellipse, drawn = fits.leading_ellipse(seconds, node, tilt, float(np.sin(mean))), None
     if ellipse is not None:
         long, short = (angle_text(size, 3) for size in ellipse.semi_axes)
-        words = f"{span_text(_TURN / ellipse.rate, 3)}: semi-axes {long}, {short}"
+        words = f"{period_text(_TURN / ellipse.rate, dataset.attrs)}: semi-axes {long}, {short}"
         drawn = ellipse.curve() / scaled(path, "rad")[0], words
     title, labels = "Nutation: the pole about its mean motion", ("Δlongitude · sin(obliquity)", "Δobliquity")
     return planar("nutation", title, path, *labels, ellipse=drawn)

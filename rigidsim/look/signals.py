@@ -20,6 +20,7 @@ _ORBIT_NORM = re.compile(r"orbit_norm_(\d+)")
 _IN_WORDS = {"energy_balance": "energy less work"}
 _AVERAGED = ("spin_averaged", "orbit_averaged")  # model levels whose datasets have axes but no attitude
 NEAR_AXIS = 0.35  # largest polar motion (rad) shown as such; beyond it, the body tumbles
+_JOINED = 0.4  # radii of the whole between neighbours of a path that is drawn as a line
 _ALIKE_PLANES = 1e-5  # between unit normals of planes that have one name
 _DEFINING = {
     "momentum": "angular_momentum", "spin": "angular_velocity", "core": "core_angular_velocity"
@@ -79,6 +80,16 @@ def principal_rates(dataset: xarray.Dataset) -> Array | None:
     return None if rates is None else turned(rates, scene_of(dataset).axes)
 
 
+def path_of_rates(dataset: xarray.Dataset) -> Array | None:
+    """The same, if rows are dense enough for its path: a mean step, weighted by steps' lengths, is short."""
+    rates = principal_rates(dataset)
+    table = np.zeros((0, 3)) if rates is None else finite_rows(rates)
+    if len(table) < 3 or energy_and_momentum(dataset) is not None:
+        return rates
+    steps, radius = norms(np.diff(table, axis=0)), float(norms(table - table.mean(axis=0)).max())
+    return rates if steps @ steps <= _JOINED * radius * steps.sum() else None
+
+
 def turned(vectors: Array, matrix: Array) -> Array:
     """Vectors (rows, 3), each times a matrix (3, 3); BLAS keeps its threads busy for ten times as long."""
     if np.array_equal(matrix, np.eye(3)):
@@ -97,7 +108,7 @@ def norms(vectors: Array) -> Array:
     return np.asarray(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)))
 
 
-def joined(values: Array, reach: float = 0.4) -> bool:
+def joined(values: Array, reach: float = _JOINED) -> bool:
     """Whether neighbours of samples (rows,) or (rows, n) lie within `reach` radii of the whole.
 
     By default these are some sixteen a turn. Where a quantity swings faster than it was sampled, lines would
@@ -195,7 +206,8 @@ def pole(dataset: xarray.Dataset, axis: str) -> Array | None:
         return in_space(dataset, scene_of(dataset).figure)
     found = values(dataset, _DEFINING[axis], 3)
     found = found if found is None or axis == "momentum" else in_space(dataset, found)
-    return None if found is None else found / norms(found)[:, None]
+    with np.errstate(invalid="ignore"):  # a body at rest has no such axis
+        return None if found is None else found / norms(found)[:, None]
 
 
 def steady_momentum(dataset: xarray.Dataset) -> Array | None:

@@ -23,6 +23,7 @@ from rigidsim.scene.bodies.presets import KnownBody
 from rigidsim.scene.kepler import combined, eccentric_anomalies, plane_vectors
 
 _FACING = 0.7  # cosine between the axis of least moment, or a mean direction, and the source
+_STEEP = 1.5  # rad of pitch, near which roll and yaw are ill-defined
 _ROUND = 0.3  # second over first extent of the figure axis' path, from which it is a cone's
 _REGULAR = 0.3  # of the mean inclination, by which it may change for the node to be regular
 
@@ -213,14 +214,30 @@ def _normal(pole: Array) -> tuple[Array, bool]:
     return ways[2] * np.sign(ways[2] @ mean), True
 
 
+def steep(angles: Array) -> bool:
+    """Whether roll and yaw of (rows, 3), rad, are ill-defined: pitch comes near a right angle."""
+    return not np.nanmax(np.abs(angles[:, 1])) < _STEEP
+
+
 def pointing_angle(dataset: xarray.Dataset) -> tuple[str, str, Array] | None:
     """A body axis, a direction in words, and the angle (rows,), rad, between them: of the axis nearest to the
-    oncoming air or, where no other angles show it, to the source.
+    oncoming air or, where no other angles show it, to the source, or to the only attractor of a body that
+    keeps an axis towards it.
     """
     ways, towards = signals.values(dataset, "air_velocity", 3), "the oncoming air"
-    if ways is None and not {"libration", "roll_pitch_yaw"} & set(dataset):
+    angles, bodies = signals.values(dataset, "roll_pitch_yaw", 3), scene_of(dataset).attractors
+    if ways is None and "libration" not in dataset and (angles is None or steep(angles)):
         ways, one = signals.values(dataset, "nadir", 3), seen(dataset)
-        towards = "the direction of " + called(None if one is None else one.body, "source")
+        body = None if one is None else one.body
+        position = signals.values(dataset, "position", 3)
+        if ways is None and position is not None and "quaternion" in dataset and len(bodies) == 1:
+            turn = rotation_matrix(np.asarray(dataset["quaternion"].transpose("time", ...).values))
+            ways = np.einsum(
+                "tij,ti->tj", turn, np.array(bodies[0].get("position") or np.zeros(3)) - position
+            )
+            ways, body = ways / signals.norms(ways)[:, None], body_of(bodies[0])
+            ways = ways if np.linalg.norm(ways.mean(axis=0)) > _FACING else None
+        towards = "the direction of " + called(body, "source")
     if ways is None or not np.isfinite(ways).any():
         return None
     mean = np.nanmean(ways / signals.norms(ways)[:, None], axis=0)

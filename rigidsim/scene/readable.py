@@ -86,6 +86,12 @@ def span_text(seconds: float, digits: int = 3, unit: TimeUnit | None = None) -> 
     return f"{number_text(seconds / unit.seconds, digits)} {unit.symbol}"
 
 
+def period_text(seconds: float, attributes: Mapping[str, Any], digits: int = 5) -> str:
+    """A time span in the unit that a run's attributes ask for, if it counts 1 to 10,000 of these."""
+    unit = unit_of(attributes, seconds)
+    return span_text(seconds, digits, unit if 1 <= abs(seconds) / unit.seconds < 1e4 else None)
+
+
 def instant_text(epoch: Epoch, seconds: float, span: float) -> str:
     """Date and time some seconds after an epoch, to about a thousandth of a span (s).
 

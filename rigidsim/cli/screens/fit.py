@@ -41,7 +41,8 @@ def print_fit(found: FitResult) -> None:
         on.line("note", f"derivatives by {found.derivatives}")
     if found.folder:
         on.line("folder", found.folder)
-        on.line("next", f"rigidsim view {found.folder}", "cyan")
+        on.line("next", f"rigidsim plot {found.folder}", "cyan")
+        on.line("", f"rigidsim view {found.folder}", "cyan")
         on.line("", f"rigidsim run {found.folder}/fitted.toml", "cyan")
 
 

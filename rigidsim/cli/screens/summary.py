@@ -196,7 +196,7 @@ def next_lines(status: str, exit_code: int, place: str) -> list[str]:
         return []
     where = shlex.quote(place)
     if exit_code == 0 and status in _DONE:
-        return [f"rigidsim view {where}", f"rigidsim plot {where}"]
+        return [f"rigidsim {command} {where}" for command in ("view", "plot", "analyse")]
     return [f"rigidsim resume {where}"] if exit_code == 130 or status in _RESUMABLE else []
 
 

@@ -13,9 +13,10 @@ from typing import Any, Self
 
 import numpy as np
 import xarray
-from matplotlib import rc_context
+from matplotlib import colormaps, rc_context
 from matplotlib.axes import Axes
 from matplotlib.axis import Tick
+from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
@@ -24,8 +25,8 @@ from matplotlib.text import Text
 from rigidsim.look import signals
 from rigidsim.look.curves import CURVES, STATES
 from rigidsim.look.figure_names import FIGURES, OVERVIEW, SPECTRUM
-from rigidsim.look.figures.panels import PLANES, Panel, draw
-from rigidsim.look.figures.style import GREY, INK, PALE, STYLE, blank
+from rigidsim.look.figures.panels import MANY, PLANES, Panel, draw
+from rigidsim.look.figures.style import GREY, INK, PALE, START, STYLE, blank
 from rigidsim.look.pages import leading, numbers
 from rigidsim.look.plots import HUES, Plot, moves, paper, screen
 from rigidsim.look.signals import clock
@@ -36,7 +37,8 @@ from rigidsim.scene.readable import span_text, unit_for
 ROWS = 20_000  # that a figure draws
 
 _TELLING = 0.5  # changes of sign to a sample: four samples a swing
-_CYCLES, _MANY = 14, 60  # swings shown of the start, where there are more than so many
+_SETTLED, _SHORT = 0.05, 0.15  # of a curve's range, about its median; of a run that is shown enlarged
+_CYCLES = 14  # swings shown of the start, where there are many
 _NAME = 30  # letters that a name in the table has room for
 _CURVE, _PLANE, _FACT = 2.55, 4.7, 0.235  # heights, inches
 _WIDE, _NARROW = 12.4, 8.2
@@ -46,6 +48,7 @@ _PLANES_WIDE = 5.2  # width of a plane where only planes stand side by side
 Finders = Mapping[str, Callable[[xarray.Dataset], Panel | None]]
 _Found = list[tuple[str, Panel]]
 GROUNDS = ("light", "dark")
+_DIM = 0.35  # of a colour map, the darkest that is seen on a dark ground
 _DARK, _BRIGHT, _GRID = "#14171d", "#f1f3f5", "#2c323c"
 _FADED = "#566071"
 _LETTERS = 1.3  # on a page of half a slide's width, which is enlarged again where it is shown
@@ -74,22 +77,30 @@ class Shown:
         return cls(*(thin(part, ROWS).assign_attrs(dataset.attrs) for part in parts))
 
     def begins(self, name: str, plot: Plot) -> float:
-        """Seconds of the start that a plot shows by itself, `_CYCLES` swings; 0 if the run has few more."""
+        """Seconds of the start that a plot shows by itself, `_CYCLES` swings or how it settles; 0 if the run
+        has few more, and takes long.
+        """
         begun = CURVES[name](self.start) if plot.begins else None
         length, span = (abs(float(x[-1] - x[0])) for x in map(signals.seconds, (self.start, self.rows)))
-        most = 0
+        most, settling = 0, 0.0
         for column in () if begun is None else begun.values.T:
             values = column[np.isfinite(column)]
             if len(values) >= 50 and moves(values):
                 changes = int(np.count_nonzero(np.diff(np.signbit(values - values.mean()))))
                 if changes < _TELLING * len(values):  # else too sparse to separate swings from a pattern
                     most = max(most, changes)
-        return 2 * _CYCLES * length / most if length > 0 and most / 2 * span / length > _MANY else 0.0
+                away = np.abs(values - np.median(values)) > _SETTLED * np.ptp(values)
+                if away[0] and away.mean() < _SHORT:
+                    last = np.flatnonzero(away[: round(2 * _SHORT * len(away))])[-1]
+                    settling = max(settling, 1.5 * length * last / len(away))
+        if length > 0 and most / 2 * span / length > MANY:
+            return 2 * _CYCLES * length / most
+        return settling
 
     def draw_first(self, axes: Axes, name: str, begins: float) -> None:
         """Draw a plot over so many seconds of the start, in a unit of time that suits them."""
         start = self.start.assign_attrs(time_unit=unit_for(begins).symbol)
-        draw(axes, start, CURVES[name](start))
+        draw(axes, start, CURVES[name](start), dense=False)
         for line in axes.get_lines():
             if line.get_linestyle() == "None":  # few enough now to be distinguished and followed
                 line.set(linestyle="-", linewidth=0.6, markersize=5.0)
@@ -153,7 +164,7 @@ def _curve_panel(
     begins = shown.begins(name, plot)
     parts = place.subgridspec(1, 2, width_ratios=[1.7, 1.0], wspace=0.03) if begins else [place]
     whole = figure.add_subplot(parts[0])
-    draw(whole, shown.rows, plot, dense=begins > 0)
+    draw(whole, shown.rows, plot)
     time_axis(whole, shown.rows, labelled=lowest or begins > 0)
     if begins:
         first = figure.add_subplot(parts[1])
@@ -179,7 +190,7 @@ def _table(axes: Axes, lines: list[tuple[str, str]]) -> None:
         height = 1.0 - (row + 0.5) / (len(lines) + 1)
         fitting = min(9.0, 9.0 * _NAME / len(name))
         axes.text(0.04, height, name, color=GREY, fontsize=fitting, va="center", clip_on=False)
-        axes.text(0.56, height, value, color=INK, fontsize=9, va="center", clip_on=False)
+        axes.text(0.5, height, value, color=INK, fontsize=9, va="center", clip_on=False)
 
 
 def slide(shown: Shown, name: str, panel: Panel, ground: str) -> Figure:
@@ -206,12 +217,14 @@ def darkened(figure: Figure) -> None:
     """Turn a drawn figure to a dark ground: letters and frame bright, hues as on the screen."""
     figure.set_facecolor(_DARK)
     hues = {paper(name): to_hex(paper(screen(name))) for name in HUES}
-    hues |= {PALE: _FADED, INK: _BRIGHT, GREY: _BRIGHT}
+    hues |= {PALE: _FADED, INK: _BRIGHT, GREY: _BRIGHT, START: to_hex(colormaps["plasma"](0.8))}
     for artist in figure.findobj(lambda one: hasattr(one, "get_color") and not isinstance(one, Tick)):
         color: Any = artist.get_color()  # type: ignore[attr-defined]
         if isinstance(color, str) and color != "none":  # else of a collection, coloured by a map
             other = _BRIGHT if isinstance(artist, Text) else color
             artist.set_color(hues.get(color, other))  # type: ignore[attr-defined]
+        elif isinstance(artist, LineCollection):  # from dark to light along time
+            artist.set_color(colormaps["plasma"](np.linspace(_DIM, 1.0, len(artist.get_segments()))))
         for effect in artist.get_path_effects() or ():  # the pale rim of letters on a light ground
             getattr(effect, "_gc", {}).update(foreground=_DARK)
     for axes in figure.axes:

@@ -15,19 +15,21 @@ from rigidsim.look.paths import PATHS, Path
 from rigidsim.look.plots import Plot, paper
 from rigidsim.look.record import scene_of
 from rigidsim.look.signals import clock
+from rigidsim.look.solids import Array
 from rigidsim.scene.readable import scaled, with_unit
 
 _HUES = {"spin axis": "orange", "momentum axis": "violet", "core axis": "pink"}
 _BANDS = 400  # parts of a panel's width, each with the least and the largest value in it
+MANY = 60  # swings of a curve that can't be followed
 _LAST_TURNS = 10  # before a body is locked, in the phase plane
 
 Panel = Plot | Path | Callable[[Axes], None]
 Find = Callable[[xarray.Dataset], Panel | None]
 
 
-def draw(axes: Axes, dataset: xarray.Dataset, panel: Panel | None, *, dense: bool = False) -> None:
-    """Draw a panel of a dataset in memory, if there is one, with title, labels and units; a plot over time of
-    more swings than can be seen (`dense`) as bands between the extremes.
+def draw(axes: Axes, dataset: xarray.Dataset, panel: Panel | None, *, dense: bool = True) -> None:
+    """Draw a panel of a dataset in memory, if there is one, with title, labels and units; curves over time of
+    `MANY` swings as bands between the extremes, if wanted (`dense`).
     """
     if isinstance(panel, Plot):
         _plot(axes, dataset, panel, dense=dense)
@@ -44,7 +46,7 @@ def _plot(axes: Axes, dataset: xarray.Dataset, plot: Plot, *, dense: bool) -> No
         color = paper(hue)
         if plot.log:
             axes.plot(time, np.where(column > 0, column, np.nan), color=color, label=label, lw=0.9)
-        elif dense and len(time) >= 4 * _BANDS:
+        elif dense and len(time) >= 4 * _BANDS and _crossings(column) > 2 * MANY:
             parts = np.arange(0, len(time), len(time) // _BANDS)
             low, high = np.fmin.reduceat(column, parts), np.fmax.reduceat(column, parts)
             at = np.append(time[parts[:-1]], time[-1])
@@ -57,16 +59,22 @@ def _plot(axes: Axes, dataset: xarray.Dataset, plot: Plot, *, dense: bool) -> No
     if plot.log and (plot.band is not None or (plot.values > 0).any()):
         axes.set_yscale("log")
     if plot.band is not None:
-        axes.fill_between(time, *plot.band, color="#e9edf2", lw=0, zorder=0)
         low = np.nanpercentile(plot.values, 1) if np.isfinite(plot.values).any() else plot.band[0][0]
         # what cancels to far less than a rounding says nothing
-        axes.set_ylim(max(min(low, plot.band[0][0]), 0.02 * plot.band[0][0]) / 5)
+        low = max(min(low, plot.band[0][0]), 0.02 * plot.band[0][0]) / 5
+        axes.fill_between(time, low, plot.band[1], color="#e9edf2", lw=0, zorder=0)
+        axes.set_ylim(low)
     if plot.steady is not None:
         axes.set_ylim(*plot.steady)
     if plot.from_zero:
         axes.set_ylim(0.0, 1.1 * axes.get_ylim()[1])
     key(axes, plot.title + (" (grey: what rounding explains)" if plot.band else ""))
     axes.set_ylabel(with_unit(plot.word, plot.unit))
+
+
+def _crossings(column: Array) -> int:
+    """How often a curve passes its mean."""
+    return int(np.count_nonzero(np.diff(np.signbit(column - np.nanmean(column)))))
 
 
 def _path(axes: Axes, path: Path) -> None:

@@ -151,7 +151,7 @@ def key(axes: Axes, title: str) -> None:
         borderpad=0.15, handlelength=1.2, columnspacing=1.2, handletextpad=0.5, labelspacing=0.25,
     )  # fmt: skip
     for line in legend.get_lines():
-        line.set(linewidth=1.8, alpha=1.0)
+        line.set(linewidth=1.8, alpha=1.0, **({"markersize": 9.0} if line.get_marker() == "." else {}))
 
 
 def _room(axes: Axes) -> float:

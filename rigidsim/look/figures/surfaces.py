@@ -209,7 +209,7 @@ def polhode(dataset: xarray.Dataset) -> Draw | None:
     """The tip of the angular velocity in principal axes, on the surfaces where it has some, else between axes
     with the ranges that it covers.
     """
-    rates = signals.principal_rates(dataset)
+    rates = signals.path_of_rates(dataset)
     return None if rates is None else partial(_polhode, dataset=dataset, rates=rates)
 
 

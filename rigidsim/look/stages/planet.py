@@ -14,7 +14,7 @@ import xarray
 
 from rigidsim.look import signals, sources
 from rigidsim.look.curves import loop_rows
-from rigidsim.look.fits import secular
+from rigidsim.look.fits import secular, turn_text
 from rigidsim.look.record import called, color_of, named_body, scene_of
 from rigidsim.look.signals import is_averaged
 from rigidsim.look.solids import Array, globe, graticule, pictured_globe
@@ -22,7 +22,7 @@ from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import FIELD, Subject, direction_of, eye_at, source_arrows
 from rigidsim.look.stages.parts import BODY, Camera, Color, Part, Picture, Stage, arrow, lines, trail
 from rigidsim.scene.bodies.presets import KNOWN, KnownBody
-from rigidsim.scene.readable import DAY, YEAR, span_text
+from rigidsim.scene.readable import DAY, YEAR
 from rigidsim.scene.rotations import quaternion_of
 
 _LARGE = 1e5  # m: a smaller body is no globe
@@ -315,7 +315,7 @@ def circle_of_precession(
         if float(np.abs(found[1] - mean.at(seconds)).max()) > max(advance, 1e-6):
             return []  # it strays as far as it advances: it goes about another pole
         if advance > 1e-9 and _whole_revolution(dataset, span):
-            words += f": once in {mean.about}{span_text(2 * np.pi / abs(mean.rate), 3)}"
+            words += f": once in {turn_text(mean, dataset.attrs)}"
             which = "pole" if axis == "figure" else axis
             notes.append(f"the {which}'s longitude moves by {mean.about}{mean.rate:.6g} rad/s on the mean")
     return [lines("precession", PRECESSION, [ring], words, place=place, width=2.0)]
