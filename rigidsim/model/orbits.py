@@ -63,6 +63,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
 from functools import cached_property, lru_cache
+from itertools import groupby
 from typing import Any, Protocol
 
 import heyoka as hy
@@ -84,8 +85,9 @@ from rigidsim.scene.point_masses import PointMasses
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.space_axes import ECLIPTIC, obliquity, to_ecliptic
 
-_AT_ONCE = 32  # pieces of a series whose numbers are worked out together
-_KEPT = 8  # such groups of each series: motions that are followed at the same time may be in different ones
+_KEPT = (
+    8  # groups of pieces of each series: motions that are followed at the same time may be in different ones
+)
 
 
 class PieceSeries(Protocol):
@@ -93,9 +95,11 @@ class PieceSeries(Protocol):
 
     Attributes:
         knots: times (ascending, internal units, working precision) at which pieces 1, 2, ... begin.
+        at_once: how many pieces' numbers are worked out together.
     """
 
     knots: list[Any]
+    at_once = 32
 
     @property
     def states(self) -> list[str]:
@@ -111,19 +115,15 @@ class Pieces:
     """Pieces of several series together: one begins wherever one of a series does.
 
     Attributes:
+        series: which they join.
         knots: as in ``PieceSeries``.
     """
 
     def __init__(self, parts: Sequence[PieceSeries]) -> None:
-        self._parts = parts
-        found = sorted((knot, place) for place, part in enumerate(parts) for knot in part.knots)
-        self.knots: list[Any] = []
-        self._numbers = [[0] * len(parts)]  # of each part's piece, for each piece
-        for knot, place in found:
-            if not self.knots or knot > self.knots[-1]:  # several parts may have knots at the same time
-                self.knots.append(knot)
-                self._numbers.append(list(self._numbers[-1]))
-            self._numbers[-1][place] += 1
+        self.series = parts
+        self.knots: list[Any] = list(parts[0].knots)
+        if len(parts) > 1:  # they may have knots at the same time
+            self.knots = [knot for knot, _ in groupby(sorted(knot for part in parts for knot in part.knots))]
         self._known: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = {}
 
     def number_at(self, time: Any) -> int:
@@ -132,27 +132,38 @@ class Pieces:
 
     def parameters(self, number: int) -> np.ndarray:
         """All parameters of a piece, working precision."""
-        return np.concatenate([self._of(place, own)[0] for place, own in enumerate(self._numbers[number])])
+        if len(self.series) == 1:
+            return self._of(0, number)[0]
+        parts = enumerate(self.series)
+        knot = self.knots[number - 1] if number else None
+        own = ((place, 0 if knot is None else bisect_right(part.knots, knot)) for place, part in parts)
+        return np.concatenate([self._of(*which)[0] for which in own])
 
     def states(self, number: int) -> dict[str, Any]:
         """Values, by name, of the states that are set where a piece begins, working precision."""
-        if number == 0:
-            return {}
-        changed: dict[str, Any] = {}
-        pairs = zip(self._numbers[number - 1], self._numbers[number], strict=True)
-        for place, (before, now) in enumerate(pairs):
-            if now != before:
-                changed.update(zip(self._parts[place].states, self._of(place, now)[1], strict=True))
-        return changed
+        pairs = ((self.series[place].states, values) for place, values in self.changes(number))
+        return {name: value for names, values in pairs for name, value in zip(names, values, strict=True)}
+
+    def changes(self, number: int) -> list[tuple[int, np.ndarray]]:
+        """The same as arrays, with the number of the series in ``series`` that each belongs to."""
+        if number and len(self.series) == 1:
+            return [(0, self._of(0, number)[1])]
+        found = []
+        for place, part in enumerate(self.series) if number else ():
+            own = bisect_right(part.knots, self.knots[number - 1])
+            if own and part.knots[own - 1] == self.knots[number - 1]:
+                found.append((place, self._of(place, own)[1]))
+        return found
 
     def _of(self, place: int, own: int) -> tuple[np.ndarray, np.ndarray]:
         """Parameters, and values of states, of one part's own piece."""
-        group, row = divmod(own, _AT_ONCE)
+        at_once = self.series[place].at_once
+        group, row = divmod(own, at_once)
         if (place, group) not in self._known:
-            if len(self._known) >= _KEPT * len(self._parts):
+            if len(self._known) >= _KEPT * len(self.series):
                 del self._known[next(iter(self._known))]
-            part, first = self._parts[place], group * _AT_ONCE
-            stop = min(first + _AT_ONCE, len(part.knots) + 1)
+            part, first = self.series[place], group * at_once
+            stop = min(first + at_once, len(part.knots) + 1)
             self._known[place, group] = part.numbers(first, stop)
         parameters, states = self._known[place, group]
         return parameters[row], states[row]
@@ -412,9 +423,9 @@ def element_states(
     begin = orbit.at(start)
     past = _name("part", tag)
     u = hy.make_vars(past)
-    piece, times = orbit.number_at(start), orbit.table.times
-    names, derivatives = [past], [hy.par[place.first]]
-    initial = [(start - times[piece]) / (times[piece + 1] - times[piece])]
+    piece = orbit.number_at(start)
+    begins, ends = orbit.time(piece), orbit.time(piece + 1)
+    names, derivatives, initial = [past], [hy.par[place.first]], [(start - begins) / (ends - begins)]
     values: dict[str, Symbolic] = {}
     rates: dict[str, Symbolic] = {}
     for i, element in enumerate(place.elements(orbit)):
@@ -484,25 +495,30 @@ def _unit(orbit: TabulatedOrbit, element: str) -> Any:
     return orbit.semi_major_axis if element == AXIS else orbit.context.one
 
 
-class TablePieces:
+class TablePieces(PieceSeries):
     """Pieces of one table, which begin at its rows (see ``rigidsim.model.orbits.PieceSeries``)."""
+
+    at_once = 256
 
     def __init__(
         self, orbit: TabulatedOrbit, place: TablePlace, scaling: Scaling, start: Any, number: Rounder
     ) -> None:
         self._orbit, self._place, self._exponent = orbit, place, scaling.time
         self._start, self._number, self._back = start, number, int(scaling.direction < 0)
-        self.knots: list[Any] = []
-        self._pieces = [orbit.number_at(start)]
-        inner = list(enumerate(orbit.table.times))[1:-1]
-        for row, time in reversed(inner) if self._back else inner:
-            if time <= start if self._back else time > start:
-                knot = number(scaling.internal(time, orbit.context))
-                if self.knots and knot == self.knots[-1]:  # rows that the precision can't distinguish
-                    self._pieces[-1] = row - self._back
-                else:
-                    self.knots.append(knot)
-                    self._pieces.append(row - self._back)
+        first, times = orbit.number_at(start), orbit.table.times
+        self._narrow = times.dtype != object and isinstance(number(orbit.context.one), float | np.float32)
+        rows = np.arange(1, len(times) - 1)
+        rows = rows[rows <= (first - (orbit.time(first) > start))][::-1] if self._back else rows[rows > first]
+        if self._narrow:
+            knots = np.ldexp(scaling.direction * times[rows], -scaling.time).astype(
+                type(number(orbit.context.one))
+            )
+        else:
+            knots = np.array([number(scaling.internal(orbit.time(row), orbit.context)) for row in rows])
+        # of rows that the precision can't distinguish the last one counts
+        last = np.append(knots[1:] != knots[:-1], np.ones(len(knots[:1]), dtype=bool)).astype(bool)
+        self.knots = list(knots[last])
+        self._pieces = np.concatenate([[first], rows[last] - self._back])
 
     @cached_property
     def states(self) -> list[str]:
@@ -511,16 +527,16 @@ class TablePieces:
 
     def numbers(self, first: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
         """See ``PieceSeries``."""
-        pieces, context = self._pieces[first:stop], self._orbit.context
-        if LONGITUDE not in self._orbit.moving and isinstance(self._number(context.one), float | np.float32):
-            return self._narrow(np.array(pieces))
+        pieces, context = self._pieces[first:stop].tolist(), self._orbit.context
+        if self._narrow:
+            return self._in_80_bits(self._pieces[first:stop])
         least = context.ldexp(1, _LEAST * bits_in_use(context))
         parameters = [[self._number(x if abs(x) > least else 0 * x) for x in self._of(one)] for one in pieces]
         states = [[self._number(x) for x in self._begin(one).values()] for one in pieces]
         kind = type(parameters[0][0])
         return np.array(parameters, dtype=kind), np.array(states, dtype=kind)
 
-    def _narrow(self, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _in_80_bits(self, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The same in double or single precision, by arrays of 80 bits: mpf take a hundred times as long."""
         orbit, kind = self._orbit, type(self._number(self._orbit.context.one))
         lengths, found = orbit.narrow_pieces(pieces)
@@ -554,8 +570,8 @@ class TablePieces:
 
     def _of(self, row: int) -> list[Any]:
         orbit = self._orbit
-        times, piece = orbit.table.times, orbit.piece(row)
-        inverse = 1 / orbit.context.ldexp(times[row + 1] - times[row], -self._exponent)
+        piece, length = orbit.piece(row), orbit.time(row + 1) - orbit.time(row)
+        inverse = 1 / orbit.context.ldexp(length, -self._exponent)
         found = [inverse]
         for element in self._place.elements(orbit):
             scale = inverse / _unit(orbit, element)
@@ -884,7 +900,7 @@ class KernelStates:
         return BlockPieces(group, begun, knots, self._scaling, context, self._number)
 
 
-class BlockPieces:
+class BlockPieces(PieceSeries):
     """Blocks of series of one length (see ``rigidsim.model.orbits.PieceSeries``)."""
 
     def __init__(

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 from pydantic import Field, StrictStr
 
 from rigidsim.errors import ensure
-from rigidsim.scene.arithmetic import cosine_and_sine, eccentric_anomaly
+from rigidsim.scene.arithmetic import WORKING_BITS, bits_in_use, cosine_and_sine, eccentric_anomaly
 from rigidsim.scene.exact import ZERO, ExactNumber
 from rigidsim.scene.fields import Positive, Rate, Rule, Second, excludes, one_of
 from rigidsim.scene.kepler import Ellipse, combined, plane_vectors
@@ -253,12 +253,14 @@ def _tabulated_orbit(
     bits: int,
     constants: tuple[tuple[str, ExactNumber], ...],
     strength: tuple[Any, ...] | None,
+    *,
     opposite: bool,
+    narrow: bool,
 ) -> TabulatedOrbit:
     """A table's orbit, made once: of its text, the elements it lacks, and an mpf's parts for Kepler's law;
     ``opposite`` as in ``Elements``.
     """
-    table = read_table(text, bits)
+    table = read_table(text, bits, narrow=narrow)
     context = table.context
     given = dict(constants)
     for key in given:
@@ -291,13 +293,16 @@ def resolve_tabulated_orbit(fields: Elements, strength: Any | None, around: Sett
     parts = None if strength is None else strength._mpf_
     constants = tuple((key, value) for key, value in given if value is not None)
     try:
-        orbit = _tabulated_orbit(name, texts[name], context.prec, constants, parts, fields.opposite)
+        orbit = _tabulated_orbit(
+            name, texts[name], context.prec, constants, parts,
+            opposite=fields.opposite, narrow=bits_in_use(context) <= WORKING_BITS["double"],
+        )  # fmt: skip
     except TableError as error:
         raise around.fault(place, f'given "{name}": {error}') from None
     start, end = sorted((around.start, around.end))
-    times = orbit.table.times
-    first, last, begin, until = (context.nstr(t, 8) for t in (times[0], times[-1], start, end))
+    ends = orbit.time(0), orbit.time(len(orbit.table.times) - 1)
+    first, last, begin, until = (context.nstr(t, 8) for t in (*ends, start, end))
     what = f'given "{name}", which reaches from t = {first} s to {last} s, but the run goes from {begin} s '
     what += f"to {until} s; give more rows, or change [time] start or end"
-    ensure(times[0] <= start and end <= times[-1], around.fault(place, what))
+    ensure(ends[0] <= start and end <= ends[1], around.fault(place, what))
     return orbit

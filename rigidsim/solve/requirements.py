@@ -8,9 +8,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import TaylorEngine
 from rigidsim.solve.precision import Scalar
+
+_MOST_PIECES = 1024  # that are passed in one call
+
+StepCallback = Callable[[TaylorEngine], bool]
+"""Called after each of many steps; False ends the call."""
+Far = tuple[Scalar, Scalar, StepCallback]
+"""The last time of a call that takes many steps, the length of these, and what to call after each, last."""
 
 
 class Requirement:
@@ -20,7 +29,7 @@ class Requirement:
         each: what to call after each of several steps that are taken at once, for the next.
     """
 
-    each: tuple[Callable[[TaylorEngine], bool], ...] = ()
+    each: tuple[StepCallback, ...] = ()
 
     def meet(self, integrator: TaylorEngine) -> Scalar | None:
         """Set it where the integrator is; returns the time beyond which no step may go, None for any."""
@@ -28,6 +37,13 @@ class Requirement:
 
     def end_after(self, time: Scalar) -> Scalar | None:
         """That time, for steps that begin at a time."""
+        return None
+
+    def far(self, begin: tuple[Scalar, Scalar], end: Scalar, until: Scalar | None) -> Far | None:
+        """How to take many steps in one call, the first from ``begin`` (two numbers) to ``end``.
+
+        None if that isn't possible with the same bits.
+        """
         return None
 
 
@@ -47,8 +63,9 @@ class SetAtKnots(Requirement):
     def __init__(self, system: System) -> None:
         assert system.pieces is not None
         self.pieces = system.pieces
-        self._places = {name: place for place, name in enumerate(system.states)}
+        self._places = [[system.states.index(name) for name in x.states] for x in self.pieces.series]
         self._entered: tuple[int, int] | None = None
+        self._equal = _equal_pieces(self.pieces.knots)
 
     def enter(self, integrator: TaylorEngine) -> int:
         """Continue in the states of the piece that begins at this boundary, or contains it: its number."""
@@ -58,24 +75,62 @@ class SetAtKnots(Requirement):
         if number and high == pieces.knots[number - 1]:
             if low != 0:
                 integrator.dtime = (high, high * 0)
-            state = integrator.state
-            for name, value in pieces.states(number).items():
-                state[self._places[name]] = value
+            self._begin(integrator, number)
         return number
+
+    def _begin(self, integrator: TaylorEngine, number: int) -> None:
+        for series, values in self.pieces.changes(number):
+            integrator.state[self._places[series]] = values
 
     def meet(self, integrator: TaylorEngine) -> Scalar | None:
         number = self.enter(integrator)
+        self._set(integrator, number)
+        return self._end(number)
+
+    def _set(self, integrator: TaylorEngine, number: int) -> None:
         if self._entered != (number, id(integrator)):
             integrator.pars[:] = self.pieces.parameters(number)
             self._entered = (number, id(integrator))
-        return self._end(number)
 
     def end_after(self, time: Scalar) -> Scalar | None:
         return self._end(self.pieces.number_at(time))
 
+    def far(self, begin: tuple[Scalar, Scalar], end: Scalar, until: Scalar | None) -> Far | None:
+        knots, number = self.pieces.knots, self.pieces.number_at(end)
+        last = min(self._equal[number - 1], number - 1 + _MOST_PIECES) if len(self._equal) else 0
+        while last >= number and until is not None and knots[last] > until:
+            last -= 1
+        if last < number or number < 2 or begin != (knots[number - 2], 0):
+            return None
+
+        def passed(engine: TaylorEngine) -> bool:
+            """Go on in the next piece, if the step ended where it begins."""
+            nonlocal number
+            if engine.time != knots[number - 1]:
+                return False
+            self._begin(engine, number)
+            self._set(engine, number)
+            number += 1
+            return True
+
+        return knots[last], knots[number - 1] - knots[number - 2], passed
+
     def _end(self, number: int) -> Scalar | None:
         knots = self.pieces.knots
         return knots[number] if number < len(knots) else None
+
+
+def _equal_pieces(knots: list[Any]) -> np.ndarray:
+    """For each knot the last one before which all pieces have exactly the length of the one that ends here;
+    empty for other types than doubles.
+    """
+    if not knots or not isinstance(knots[0], float):
+        return np.zeros(0, dtype=int)
+    lengths = np.diff(np.array([knots[0], *knots]).astype(np.longdouble))
+    exact = lengths == lengths.astype(np.float64)
+    changes = np.flatnonzero((lengths[1:] != lengths[:-1]) | ~exact[1:])  # after these
+    ends = np.append(changes, len(knots) - 1)
+    return np.asarray(ends[np.searchsorted(ends, np.arange(len(knots)))])
 
 
 class SecondNumber(Requirement):

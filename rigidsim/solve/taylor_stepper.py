@@ -12,7 +12,7 @@ from rigidsim.model.system import System
 from rigidsim.solve.compiled import TaylorEngine, compiled_engine, interruptible
 from rigidsim.solve.events import EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
-from rigidsim.solve.requirements import requirement_of
+from rigidsim.solve.requirements import Far, StepCallback, requirement_of
 from rigidsim.solve.stepper import Mark, SamplesWithin, Stepper, bound_of_sparse_series, longest_step
 
 _ARRIVED = hy.taylor_outcome.time_limit
@@ -24,9 +24,6 @@ _HOPELESS_STEPS = 1e15  # left to the last sample; at the fastest pace they woul
 _LEAST_GRID = 8  # steps from which a grid, of 20 us, costs less than a callback
 _TINY_STEPS = 32  # in a row, before a run is given up: a close passage has some
 _LONGEST_FOLLOWED = 1.0  # a turn by 1 rad or less: in the partner chart angles are followed step by step
-
-StepCallback = Callable[[TaylorEngine], bool]
-"""Called after each of many steps; False ends the call."""
 
 
 class TaylorStepper(Stepper):
@@ -55,7 +52,7 @@ class TaylorStepper(Stepper):
         self._bounds = [precision.number(system.scene.context.mpf(bound)) for bound in bounds]
         self._longest = self._bounds[0]
         self.bound_steps()
-        self._tiny = 0
+        self._tiny, self._whole = 0, False  # whether the latest step ended a piece of the equations by itself
         self._epsilon = float(precision.epsilon)
         self.begun = TaylorStepper.mark(self)
 
@@ -224,6 +221,9 @@ class TaylorStepper(Stepper):
         in the piece before.
         """
         engine, before = self._integrator, self._integrator.dtime
+        far = self._requirement.far(before, end, self.until) if end is not None and self._whole else None
+        if far is not None:
+            return self._propagate(far[0], count, samples, far=far)
         plain = end is None and not self._requirement.each and before[1] == 0
         if samples is None or len(samples.states) or not plain or count < _LEAST_GRID:
             return self._propagate(end, count, samples)
@@ -255,18 +255,27 @@ class TaylorStepper(Stepper):
         return False
 
     def _propagate(
-        self, until: Scalar | None, count: int, samples: SamplesWithin | None = None, *, dense: bool = False
+        self,
+        until: Scalar | None,
+        count: int,
+        samples: SamplesWithin | None = None,
+        *,
+        dense: bool = False,
+        far: Far | None = None,
     ) -> bool:
-        """Take at most ``count`` steps, none beyond a time: whether all went well."""
-        before = self._integrator.dtime
+        """Take at most ``count`` steps, none beyond a time, or as a requirement says: whether all is well."""
+        before, longest, called = self._integrator.dtime, self._longest, [] if samples is None else [samples]
+        if far is not None:
+            longest, called = min(far[1], longest), [*called, far[2]]
         outcome, smallest, largest, taken, *_ = self._integrator.propagate_until(
             self._far if until is None else until,
             max_steps=count,
-            max_delta_t=self._longest,
-            callback=self._watched(*([] if samples is None else [samples])),
+            max_delta_t=longest,
+            callback=self._watched(*called),
             write_tc=dense or samples is not None or self.watcher is not None,
         )
-        return self._account(before, outcome, smallest, largest, taken)
+        self._whole = until == self._integrator.time and (taken == 1 or far is not None)
+        return self._account(before, outcome, smallest, largest, taken, longest)
 
     def _account(
         self,
@@ -275,12 +284,13 @@ class TaylorStepper(Stepper):
         smallest: Scalar,
         largest: Scalar,
         taken: int,
+        longest: Scalar | None = None,
     ) -> bool:
         self.smallest, self.largest = abs(float(smallest)), abs(float(largest))
         if taken and self.largest == 0.0 and self._integrator.dtime != before:
             # heyoka omits steps of the greatest allowed size, and one that ends where it must
             gone = abs(float(self._integrator.time - before[0])) if taken == 1 else 0.0
-            self.smallest = self.largest = gone or float(self._longest)
+            self.smallest = self.largest = gone or float(longest or self._longest)
         self.steps += int(taken)
         self._judge(before[0], int(taken))
         return bool(outcome != _LOST)

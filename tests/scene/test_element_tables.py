@@ -34,7 +34,8 @@ def with_table(text: str, more: str = "", end: str = "60 day", start: str = "0")
 
 def test_numbers_units_and_order() -> None:
     text = "# late rows first\ntime (yr), inclination [deg]\n" + "\n".join(f"{-i}, 0.1" for i in range(8))
-    experiment = parse(with_table(text, ', semi_major_axis = "1 au"', end="0", start="-5 yr"))
+    given = with_table(text, ', semi_major_axis = "1 au"', end="0", start="-5 yr")
+    experiment = parse(given, overrides=['integrator.precision="quadruple"'])
     table = build_scene(experiment).loads[0].table.table  # type: ignore[attr-defined]
     assert table.times[0] == -7 * 31557600
     assert table.times[-1] == 0

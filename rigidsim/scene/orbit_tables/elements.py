@@ -5,19 +5,27 @@
     0, 1.523679, 0.0934, 1.85, 49.56
     1, 1.523679, 0.0943, 1.84, 49.27
 
-A column without a unit is in SI (radians). Numbers keep their digits, as everywhere in a config.
+A column without a unit is in SI (radians). Programs that integrate the solar system write tables without
+names: ``FORMATS`` has their columns, of which the mean anomalies are left out, since rows are centuries
+apart. Their rows begin with the first line of as many numbers, with an eccentricity below 1.
+
+Numbers keep their digits in mpf. For scenes of at most double precision they are read in 80 bits, in a
+hundredth of the time; elements with an anomaly, which counts millions of turns, stay mpf.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import mpmath
+import numpy as np
 
 from rigidsim.scene.exact import parse_number
-from rigidsim.scene.text_tables import TableError, TextTable, name_and_unit, open_table
+from rigidsim.scene.orbit_tables.interpolation import in_80_bits
+from rigidsim.scene.text_tables import TableError, TextTable, as_number, name_and_unit, open_table
 from rigidsim.scene.validation_messages import nearest, shown
 
 TIME = "time"
@@ -26,63 +34,121 @@ _ANGLES = (
 )  # fmt: skip
 UNITS = {TIME: "s", "semi_major_axis": "m", "eccentricity": "1"} | dict.fromkeys(_ANGLES, "rad")
 """Columns that a table may have, with the SI units into which they are read."""
+REGULAR = ("k", "h", "q", "p")
+"""Columns in place of eccentricity and angles, see ``rigidsim.scene.orbit_tables.pieces``."""
+_PLANE = "inclination [deg], "
+_LEFT_OUT = "-"
+FORMATS: Mapping[str, str] = {
+    "hnbody": f"time [day], semi_major_axis [au], eccentricity, {_PLANE}longitude_of_periapsis [deg], "
+    "ascending_node [deg], -, -",
+    "orbitn": f"time [day], semi_major_axis [au], eccentricity, {_PLANE}-, ascending_node [deg], "
+    "longitude_of_periapsis [deg], -",
+    "vplanet": f"time [yr], semi_major_axis [au], eccentricity, {_PLANE}periapsis [deg], "
+    "ascending_node [deg], -",
+    "la2010": "time [kyr], semi_major_axis [au], -, k, h, q, p",
+}
+"""Columns of tables without names: as HNBody writes them for snvec (Zeebe & Lourens 2022), as orbitN does
+(Zeebe 2023), as VPLanet's DistRot reads them (Deitrick et al. 2018), and of La2010 (Laskar et al. 2011).
+"""
 FEWEST_ROWS = 8
 """Least number of rows, so that every other row still suffices for a check of the interpolation."""
 _DECIMAL = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d{1,3})?")
+_IN_DECIMALS = frozenset("0123456789+-.eE")
 _LONGEST_CELL = 400
 
 
 @dataclass(frozen=True)
 class ElementTable:
-    """Numbers of a table (mpf, SI): ascending times, and for each a value of the other columns."""
+    """Numbers of a table, SI, in arrays (rows,) of mpf or of 80 bits: ascending times, and other columns."""
 
-    times: Sequence[Any]
-    columns: Mapping[str, Sequence[Any]]
+    times: np.ndarray
+    columns: Mapping[str, np.ndarray]
     context: Any
 
 
 @lru_cache(8)
-def read_table(text: str, bits: int) -> ElementTable:
-    """Read a table's text in numbers of so many bits; ``TableError`` names the line at fault."""
+def read_table(text: str, bits: int, *, narrow: bool = False, format: str | None = None) -> ElementTable:
+    """Read a table's text; ``TableError`` names the line at fault.
+
+    Args:
+        bits: of the numbers.
+        narrow: whether 80 bits suffice for elements without an anomaly.
+        format: a key of ``FORMATS`` for a table without names.
+    """
     context = mpmath.MPContext()
     context.prec = bits
-    table = open_table(text.splitlines)
-    factors = {name: factor.at(context) for name, factor in _factors(table).items()}
-    lines: list[int] = []
-    rows: list[list[Any]] = []
-    for number, cells in table.rows():
-        lines.append(number)
-        plain = [table.plain(cell) for cell in cells]
-        for name, cell in zip(factors, plain, strict=True):
-            if len(cell) > _LONGEST_CELL or _DECIMAL.fullmatch(cell) is None:
-                raise TableError(f"line {number}: given {shown(cell)} as {name}; a decimal number is "
-                                 "allowed, without a unit (the line of names has it)")  # fmt: skip
-        rows.append([context.mpf(x) * factor for x, factor in zip(plain, factors.values(), strict=True)])
-    if len(rows) < FEWEST_ROWS:
-        raise TableError(f"has {len(rows)} rows; {FEWEST_ROWS} or more are needed to interpolate")
-    columns = {name: list(values) for name, values in zip(factors, zip(*rows, strict=True), strict=True)}
-    if columns[TIME][0] > columns[TIME][-1]:
-        lines, columns = lines[::-1], {name: values[::-1] for name, values in columns.items()}
-    times = columns.pop(TIME)
-    for i in range(len(times) - 1):
-        if not times[i] < times[i + 1]:
-            raise TableError(f"line {max(lines[i : i + 2])}: its time doesn't go on from the row before; "
-                             "times must ascend, or descend, from row to row")  # fmt: skip
-    return ElementTable(times, columns, context)
+    table = open_table(text.splitlines) if format is None else _of_format(text, format)
+    factors = {name: factor.at(context) for name, factor in _factors(table, format).items()}
+    narrow = narrow and not {"mean_anomaly", "mean_longitude"} & {*factors}
+    lines, values = _numbers(table, list(factors), context, narrow=narrow)
+    if len(lines) < FEWEST_ROWS:
+        raise TableError(f"has {len(lines)} rows; {FEWEST_ROWS} or more are needed to interpolate")
+    scales = np.array(list(factors.values()), dtype=object)
+    values = values * (in_80_bits(scales) if narrow else scales)
+    if values[0, 0] > values[-1, 0]:
+        lines, values = lines[::-1], values[::-1]
+    back = np.flatnonzero(values[1:, 0] <= values[:-1, 0])
+    if len(back):
+        raise TableError(f"line {max(lines[back[0] : back[0] + 2])}: its time doesn't go on from the row "
+                         "before; times must ascend, or descend, from row to row")  # fmt: skip
+    columns = dict(zip(factors, np.ascontiguousarray(values.T), strict=True))
+    for name in [name for name in columns if name.startswith(_LEFT_OUT)]:
+        del columns[name]
+    return ElementTable(columns.pop(TIME), columns, context)
 
 
-def _factors(table: TextTable) -> dict[str, Any]:
-    """Exact factors to SI of the columns, by their names without units."""
+def _numbers(
+    table: TextTable, names: list[str], context: Any, *, narrow: bool
+) -> tuple[list[int], np.ndarray]:
+    """Numbers of the lines, and the numbers in them (rows, columns) as they are written."""
+    rows = [(number, [table.plain(cell) for cell in cells]) for number, cells in table.rows()]
+    flat = [cell for _, cells in rows for cell in cells]
+    found = None
+    if narrow and _IN_DECIMALS.issuperset("".join(flat)):
+        with suppress(ValueError):  # the line at fault is found below
+            found = np.array(flat, dtype="S").astype(np.longdouble)
+    if found is None or not np.isfinite(found).all():
+        for number, cells in rows:
+            for name, cell in zip(names, cells, strict=True):
+                if len(cell) > _LONGEST_CELL or _DECIMAL.fullmatch(cell) is None:
+                    raise TableError(f"line {number}: given {shown(cell)} as {name}; a decimal number is "
+                                     "allowed, without a unit (the line of names has it)")  # fmt: skip
+        found = np.array([context.mpf(cell) for cell in flat], dtype=object)
+        found = in_80_bits(found) if narrow else found
+    return [number for number, _ in rows], found.reshape(len(rows), len(names))
+
+
+def _of_format(text: str, format: str) -> TextTable:
+    """A table without names, from its first row on."""
+    names = FORMATS[format].split(", ")
+    place = names.index("eccentricity") if "eccentricity" in names else names.index("k")
+
+    def lines() -> Iterator[str]:
+        return (line.replace("D", "E").replace(",", " ") for line in text.splitlines())
+
+    for number, line in enumerate(lines()):
+        cells = list(map(as_number, line.split()))
+        if len(cells) == len(names) and abs(cells[place]) < 1:
+            return TextTable(lines, names, "", number)
+    raise TableError(f'has no line of {len(names)} numbers, as format = "{format}" has: {FORMATS[format]}')
+
+
+def _factors(table: TextTable, format: str | None) -> dict[str, Any]:
+    """Exact factors to SI of the columns, by their names without units; columns to leave out are numbered."""
     found: dict[str, Any] = {}
-    for given in table.names:
+    units = UNITS if format is None else {**UNITS, **dict.fromkeys(REGULAR, "1")}
+    for place, given in enumerate(table.names):
         name, unit = name_and_unit(given)
-        if name not in UNITS:
+        if format is not None and given == _LEFT_OUT:
+            found[f"{_LEFT_OUT}{place}"] = parse_number(1)
+            continue
+        if name not in units:
             raise TableError(f"line {table.head}: given the column {shown(name)}{nearest(name, UNITS)}; "
                              f"allowed: {', '.join(UNITS)}")  # fmt: skip
         if name in found:
             raise TableError(f"line {table.head}: the column {name} is there twice; give each once")
         try:
-            found[name] = parse_number(f"1 {unit}" if unit else 1, UNITS[name])
+            found[name] = parse_number(f"1 {unit}" if unit else 1, units[name])
         except ValueError as error:
             raise TableError(f"line {table.head}: column {name}: {error}") from None
     if TIME not in found:

@@ -12,7 +12,7 @@ Errors are measured by leaving out and interpolating every other row; for the el
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +25,7 @@ AXIS, LONGITUDE = "axis", "longitude"
 EXCENTRIC, TILTED = ("k", "h"), ("q", "p")
 _LARGEST_ERROR = 0.1  # rad, of the direction when every other row is left out
 NEAREST = 7
+_MOST_ROWS = 4096
 
 
 class Interpolation:
@@ -36,8 +37,8 @@ class Interpolation:
         self.lengths, self.values = lengths, values
 
     def narrowed(self) -> Interpolation:
-        """The same, of mpf, in the platform's longest floating point, of at least double precision."""
-        return Interpolation(_in_80_bits(self.lengths), _in_80_bits(self.values))
+        """The same in the platform's longest floating point, of at least double precision."""
+        return Interpolation(in_80_bits(self.lengths), in_80_bits(self.values))
 
     def pieces(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Of pieces (n,) lengths (n,), and coefficients (n, 6, columns) of the powers of
@@ -61,7 +62,10 @@ class Interpolation:
         return length, np.stack(powers, axis=1)
 
 
-def _in_80_bits(exact: np.ndarray) -> np.ndarray:
+def in_80_bits(exact: np.ndarray) -> np.ndarray:
+    """Numbers (mpf, in an array of objects) in the platform's longest floating point."""
+    if exact.dtype != object:
+        return exact
     high = exact.astype(np.float64)
     return high.astype(np.longdouble) + (exact - high).astype(np.float64)
 
@@ -107,21 +111,27 @@ class InterpolationError:
 
 
 def interpolation_error(
-    times: Sequence[Any], elements: Mapping[str, Sequence[Any]], moving: Collection[str]
+    times: np.ndarray, elements: Mapping[str, Any], moving: Collection[str]
 ) -> InterpolationError:
-    """Measure the interpolation errors of a table with ``elements`` of each row (mpf, SI), of which those
-    ``moving`` change; ``TableError`` for rows so far apart that the table means little between them.
+    """Measure errors of a table with ``elements``: arrays (rows,) if ``moving``, else numbers.
+
+    Raises:
+        TableError: rows are so far apart that the table means little between them.
     """
-    begin = times[0]
-    seconds = np.array([float(t - begin) for t in times])
-    exact = {n: np.array([float(x) for x in rows]) for n, rows in elements.items() if n != LONGITUDE}
+    seconds = (times - times[0]).astype(np.float64)
+    exact = {name: np.broadcast_to(np.asarray(x, dtype=np.float64), seconds.shape)
+             for name, x in elements.items() if name != LONGITUDE}  # fmt: skip
     timed = LONGITUDE in moving
     if timed:
-        values = elements[LONGITUDE]
-        linear = (values[-1] - values[0]) / (times[-1] - begin)
-        pairs = zip(values, times, strict=True)
-        exact[LONGITUDE] = np.array([float(x - values[0] - linear * (t - begin)) for x, t in pairs])
+        values = elements[LONGITUDE] - elements[LONGITUDE][0]
+        linear = values[-1] / (times[-1] - times[0])
+        exact[LONGITUDE] = (values - linear * (times - times[0])).astype(np.float64)
     rows, found = left_out(seconds, np.array([exact[name] for name in moving]).T)
+    if len(rows) > _MOST_ROWS:  # of many those where elements are most in error
+        given = np.array([exact[name][rows] for name in moving]).T
+        sizes = np.abs((found - given) / np.maximum(np.abs(given).max(axis=0), 1e-300)).max(axis=1)
+        worst = np.sort(np.argpartition(sizes, -_MOST_ROWS)[-_MOST_ROWS:])
+        rows, found = rows[worst], found[worst]
     guessed = {name: values[rows] for name, values in exact.items()}
     tabulated = dict(guessed)
     for i, name in enumerate(moving):
@@ -131,8 +141,8 @@ def interpolation_error(
     phases = [0.0] if timed else [i * math.pi / 4 for i in range(8)]
     base = np.zeros(len(rows))
     if timed:
-        turn = 2 * begin.context.pi
-        base = np.array([float(elements[LONGITUDE][r] % turn) for r in rows])
+        turn = 2 * times[0].context.pi
+        base = (elements[LONGITUDE][rows] % turn).astype(np.float64)
     for phase in phases:
         shift = guessed.get(LONGITUDE, 0.0) - tabulated.get(LONGITUDE, 0.0)
         one, r_one = _places(tabulated, base + phase)

@@ -14,14 +14,13 @@ the mean longitude advances at the rate of Kepler's third law, or of ``period``.
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from operator import add, mul, neg
 from typing import Any
 
 import numpy as np
 
-from rigidsim.scene.arithmetic import eccentric_anomaly
+from rigidsim.scene.arithmetic import Matrix, eccentric_anomaly
 from rigidsim.scene.kepler import regular_place
-from rigidsim.scene.orbit_tables.elements import ElementTable
+from rigidsim.scene.orbit_tables.elements import FEWEST_ROWS, REGULAR, ElementTable
 from rigidsim.scene.orbit_tables.interpolation import (
     AXIS,
     EXCENTRIC,
@@ -29,6 +28,7 @@ from rigidsim.scene.orbit_tables.interpolation import (
     TILTED,
     Interpolation,
     InterpolationError,
+    in_80_bits,
     interpolation_error,
 )
 from rigidsim.scene.text_tables import TableError
@@ -38,9 +38,12 @@ _LARGEST_TILT = 0.9999  # of sin(i/2): 178.4 deg
 
 
 class TabulatedOrbit:
-    """An orbit with elements over time; numbers are mpf of the scene's precision, SI. ``motion`` gives the
-    mean motion for a semi-major axis. The elements are the table's; with ``opposite`` they are the other
-    body's: half a turn on in its plane.
+    """An orbit with elements over time, SI: mpf of the scene's precision, or arrays over the rows.
+
+    ``motion`` gives the mean motion for a semi-major axis. The elements are the table's; with ``opposite``
+    they are the other body's: half a turn on in its plane. ``axes`` (rows) are the table's axes in space
+    axes, if they differ. Over a ``window`` (s) elements are averaged with Hann's weights; rows are left out
+    where it reaches beyond the ends.
     """
 
     def __init__(
@@ -51,79 +54,135 @@ class TabulatedOrbit:
         motion: Callable[[Any], Any],
         *,
         opposite: bool = False,
+        axes: Matrix | None = None,
+        window: Any | None = None,
     ) -> None:
         self.name, self.table, self.motion = name, table, motion
         self.context = table.context
         self._constants = constants
         self.opposite, self._half_turn = opposite, self.context.pi if opposite else self.context.zero
-        self._rows = self._regular()
-        moving = [name for name, values in self._rows.items() if isinstance(values, list)]
-        self.moving: tuple[str, ...] = tuple(moving)
+        self._rows = self._regular(axes)
+        if window is not None:
+            self._average(window)
+        self.moving = tuple(name for name, values in self._rows.items() if isinstance(values, np.ndarray))
         """The elements that change, among axis, k, h, q, p, longitude."""
-        columns = np.array([self._rows[name] for name in moving], dtype=object).T
-        self._interpolation = Interpolation(np.diff(np.array(table.times, dtype=object)), columns)
+        columns = np.array([self._rows[name] for name in self.moving]).T
+        self._interpolation = Interpolation(np.diff(self.table.times), columns)
         self._pieces: dict[int, dict[str, list[Any]]] = {}
 
     # --- rows -----------------------------------------------------------------------------------------------
 
-    def _regular(self) -> dict[str, Any]:
-        """The regular elements: for each a list over the rows, or one constant."""
-        context, columns, zero = self.context, self.table.columns, self.context.zero
+    def _of_rows(self, name: str) -> Callable[..., Any]:
+        """A function of the scene's context, or of numpy for arrays of 80 bits."""
+        exact = getattr(self.context, name)
+        by_row = np.frompyfunc(exact, 1, 1)
+
+        def function(x: Any) -> Any:
+            if not isinstance(x, np.ndarray):
+                return exact(x)
+            return by_row(x) if x.dtype == object else getattr(np, name)(x)
+
+        return function
+
+    def _regular(self, axes: Matrix | None) -> dict[str, Any]:
+        """The regular elements: for each an array over the rows, or one constant."""
+        columns, zero = self.table.columns, self.context.zero
         given = {**self._constants, **columns}
+        cos, sin = map(self._of_rows, ("cos", "sin"))
 
         def pairs(size: Any, angle: Any) -> tuple[Any, Any]:
-            if not isinstance(size, list) and size == 0:
+            if not isinstance(size, np.ndarray) and size == 0:
                 return zero, zero
-            cosines, sines = (_by_row(f, angle) for f in (context.cos, context.sin))
-            return _by_row(mul, size, cosines), _by_row(mul, size, sines)
+            size, angle = _alike(size, angle)
+            return size * cos(angle), size * sin(angle)
 
         names = "eccentricity", "inclination", "ascending_node", "periapsis"
         axis, (e, tilt, node, argument) = given["semi_major_axis"], (given.get(x, zero) for x in names)
         periapsis = given.get("longitude_of_periapsis")
         if periapsis is None:
-            periapsis = _by_row(add, argument, node)
+            periapsis = np.add(*_alike(argument, node))
         self._longitude_of_periapsis = periapsis
-        half = _by_row(lambda x: context.sin(x / 2), tilt)
+        half = sin(tilt / 2)
+        if REGULAR[0] in given:
+            k, h, q, p = (given[x] for x in REGULAR)
+            e, half = (self._of_rows("sqrt")(x * x + y * y) for x, y in ((k, h), (q, p)))
+            self._longitude_of_periapsis = None
         self._check("semi_major_axis", axis, lambda x: x > 0, "a positive length")
-        self._check("eccentricity", e, lambda x: 0 <= x < 1, "0 (a circle) to below 1")
-        self._check("inclination", half, lambda x: 0 <= x < _LARGEST_TILT, "0 to 178 deg")
-        k, h = pairs(e, periapsis)
-        q, p = pairs(half, node)
+        self._check("eccentricity", e, lambda x: (x >= 0) & (x < 1), "0 (a circle) to below 1")
+        self._check("inclination", half, lambda x: (x >= 0) & (x < _LARGEST_TILT), "0 to 178 deg")
+        if REGULAR[0] not in given:
+            (k, h), (q, p) = pairs(e, periapsis), pairs(half, node)
+        if axes is not None:
+            k, h, q, p = self._turned(axes, k, h, q, p)
         if self._half_turn:
-            k, h = (_by_row(neg, x) for x in (k, h))
+            k, h = -k, -h
         found = {AXIS: axis, "k": k, "h": h, "q": q, "p": p}
         longitude = given.get("mean_longitude")
         if "mean_anomaly" in columns:
-            longitude = _by_row(add, columns["mean_anomaly"], periapsis)
-        if isinstance(longitude, list):
-            longitude = _by_row(add, longitude, self._half_turn)
-            found[LONGITUDE] = self._unwrapped(longitude, axis)
+            longitude = columns["mean_anomaly"] + periapsis
+        if isinstance(longitude, np.ndarray):
+            found[LONGITUDE] = self._unwrapped(longitude + self._half_turn, axis)
         return found
 
-    def _check(self, name: str, values: Any, allowed: Callable[[Any], bool], words: str) -> None:
-        for row, value in enumerate(values if isinstance(values, list) else [values]):
-            if not allowed(value):
-                at = f"row {row + 1}: " if isinstance(values, list) else ""
-                raise TableError(f"{at}{name} is out of range; {words} is allowed")
+    def _turned(self, axes: Matrix, *regular: Any) -> tuple[Any, ...]:
+        """Regular elements against space axes, of such against other axes (rows)."""
+        sqrt = self._of_rows("sqrt")
+        k, h, q, p, *flat = _alike(*regular, *(x for axis in axes for x in axis))
+        chi = sqrt(1 - p * p - q * q)
+        # the plane's normal, and the pericentre's direction times e, from the axes of longitudes
+        normal = [2 * p * chi, -2 * q * chi, 1 - 2 * (p * p + q * q)]
+        along, across = [1 - 2 * p * p, 2 * p * q, -2 * p * chi], [2 * p * q, 1 - 2 * q * q, 2 * q * chi]
+        towards = [k * x + h * y for x, y in zip(along, across, strict=True)]
+        n, e = ([sum(flat[3 * j + i] * v[j] for j in range(3)) for i in range(3)] for v in (normal, towards))
+        self._check("inclination", n[2], lambda z: z > 1 - 2 * _LARGEST_TILT**2, "0 to 178 deg")
+        double = sqrt(2 * (1 + n[2]))
+        q, p = -n[1] / double, n[0] / double
+        along, across = [1 - 2 * p * p, 2 * p * q, -p * double], [2 * p * q, 1 - 2 * q * q, q * double]
+        k, h = (sum(x * y for x, y in zip(e, v, strict=True)) for v in (along, across))
+        return k, h, q, p
 
-    def _unwrapped(self, longitude: list[Any], axis: Any) -> list[Any]:
+    def _check(self, name: str, values: Any, allowed: Callable[[Any], Any], words: str) -> None:
+        bad = np.flatnonzero(~np.atleast_1d(allowed(values)).astype(bool))
+        if len(bad):
+            at = f"row {bad[0] + 1}: " if isinstance(values, np.ndarray) else ""
+            raise TableError(f"{at}{name} is out of range; {words} is allowed")
+
+    def _unwrapped(self, longitude: np.ndarray, axis: Any) -> np.ndarray:
         """The mean longitude with the whole turns between rows that Kepler's law gives."""
-        context, times = self.context, self.table.times
-        rates, turn = _by_row(lambda a, _: self.motion(a), axis, times), 2 * context.pi
-        found = [longitude[0]]
-        for i in range(1, len(times)):
-            expected = (rates[i - 1] + rates[i]) / 2 * (times[i] - times[i - 1])
-            off = (longitude[i] - found[-1] - expected) / turn
-            part = off - context.nint(off)
-            if abs(part) > _DOUBTFUL_TURN:
-                raise TableError(
-                    f"rows {i} and {i + 1}: the mean longitude is {float(abs(part)):.2f} turns off the "
-                    f"{float(expected / turn):.6g} turns of Kepler's third law between them, so that whole "
-                    "turns can't be counted; give rows closer together, a column semi_major_axis, or period; "
-                    "or leave the anomaly's column out for a mean longitude by Kepler's law"
-                )
-            found.append(found[-1] + expected + part * turn)
-        return found
+        times, turn = self.table.times, 2 * self.context.pi
+        rates = np.array([self.motion(a) for a in np.broadcast_to(axis, times.shape)], dtype=object)
+        expected = (rates[:-1] + rates[1:]) / 2 * np.diff(times)
+        off = (np.diff(longitude) - expected) / turn
+        part = off - np.frompyfunc(self.context.nint, 1, 1)(off)
+        doubtful = np.flatnonzero((abs(part) > _DOUBTFUL_TURN).astype(bool))
+        if len(doubtful):
+            i = int(doubtful[0])
+            raise TableError(
+                f"rows {i + 1} and {i + 2}: the mean longitude is {float(abs(part[i])):.2f} turns off the "
+                f"{float(expected[i] / turn):.6g} turns of Kepler's third law between them, so that whole "
+                "turns can't be counted; give rows closer together, a column semi_major_axis, or period; "
+                "or leave the anomaly's column out for a mean longitude by Kepler's law"
+            )
+        return np.concatenate([longitude[:1], longitude[0] + np.cumsum(expected + part * turn)])
+
+    def _average(self, window: Any) -> None:
+        """Average all elements over a window, and leave out the rows whose window reaches beyond the ends."""
+        times = self.table.times
+        steps = np.diff(times)
+        if LONGITUDE in self._rows:
+            raise TableError("has an anomaly, which no average keeps; leave window or that column out")
+        if (abs(steps - steps[0]) > abs(steps[0]) / 2**20).any():
+            raise TableError("has rows at unequal distances, over which no window averages; leave window out")
+        half = int(window / self.context.convert(steps[0]) / 2)  # rows within it, on either side
+        if not 1 <= half <= (len(times) - FEWEST_ROWS) // 2:
+            what = f"has {len(times)} rows, {float(steps[0]):.6g} s apart, of which a window takes"
+            raise TableError(f"{what} {2 * half + 1}; 3 to {len(times) - FEWEST_ROWS} are allowed")
+        weights = np.cos(np.arange(-half, half + 1) * (np.pi / (2 * half + 2))) ** 2
+        weights /= weights.sum()
+        for name, values in self._rows.items():
+            if isinstance(values, np.ndarray):
+                self._rows[name] = np.convolve(values, weights.astype(values.dtype), "valid")
+        self.table = ElementTable(times[half:-half], {}, self.context)
 
     # --- pieces ---------------------------------------------------------------------------------------------
 
@@ -131,7 +190,10 @@ class TabulatedOrbit:
         """For each changing element, the coefficients of the powers 0 to 5 of (t - t_i) / (t_{i+1} - t_i)."""
         if number not in self._pieces:
             _, coefficients = self._interpolation.pieces(np.array([number]))
-            self._pieces[number] = {name: list(coefficients[0, :, i]) for i, name in enumerate(self.moving)}
+            columns = coefficients[0].T
+            self._pieces[number] = {
+                name: list(map(self.context.convert, c)) for name, c in zip(self.moving, columns, strict=True)
+            }
         return self._pieces[number]
 
     def narrow_pieces(self, numbers: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
@@ -145,16 +207,25 @@ class TabulatedOrbit:
 
     def row(self, number: int) -> dict[str, Any]:
         """All elements of a row of the table."""
-        return {name: x[number] if isinstance(x, list) else x for name, x in self._rows.items()}
+        return {
+            name: self.context.convert(x[number]) if isinstance(x, np.ndarray) else x
+            for name, x in self._rows.items()
+        }
+
+    def time(self, number: int) -> Any:
+        """Time of a row, s (mpf)."""
+        return self.context.convert(self.table.times[number])
 
     def number_at(self, time: Any) -> int:
         """Number of the piece that contains a time; the first or last beyond the table's ends."""
-        return min(max(bisect_right(self.table.times, time) - 1, 0), len(self.table.times) - 2)
+        found = bisect_right(range(len(self.table.times)), time, key=self.time) - 1
+        return min(max(found, 0), len(self.table.times) - 2)
 
     def at(self, time: Any) -> dict[str, Any]:
         """All elements at a time (s), interpolated or constant."""
-        number, times = self.number_at(time), self.table.times
-        x = (time - times[number]) / (times[number + 1] - times[number])
+        number = self.number_at(time)
+        begin, end = self.time(number), self.time(number + 1)
+        x = (time - begin) / (end - begin)
         found = {name: values for name, values in self._rows.items() if name not in self.moving}
         for name, c in self.piece(number).items():
             found[name] = ((((c[5] * x + c[4]) * x + c[3]) * x + c[2]) * x + c[1]) * x + c[0]
@@ -185,46 +256,42 @@ class TabulatedOrbit:
         given = self._constants.get("mean_longitude")
         if given is None:
             periapsis = self._longitude_of_periapsis
-            if isinstance(periapsis, list):
+            if periapsis is None or isinstance(periapsis, np.ndarray):
                 given_side = -1 if self._half_turn else 1
                 periapsis = self.context.atan2(given_side * elements["h"], given_side * elements["k"])
-            given = self._constants.get("mean_anomaly", self.context.zero) + periapsis
+            given = self._constants.get("mean_anomaly", self.context.zero) + self.context.convert(periapsis)
         return given + self._half_turn + self.motion(elements[AXIS]) * time
 
     @property
     def described(self) -> str:
         """Description for ``plan``: the table, and the errors of interpolation between its rows."""
-        times, error = self.table.times, self.error
-        nstr = self.context.nstr
+        count, error, nstr = len(self.table.times), self.error, self.context.nstr
         return (
-            f'by the table "{self.name}" ({len(times)} rows, t = {nstr(times[0], 8)} to '
-            f"{nstr(times[-1], 8)} s; with every other row left out interpolation misses the source's "
-            f"direction by at most {error.direction:.1e} rad and its distance by {error.distance:.1e} of it, "
-            f"with all rows by about {error.expected:.3f} of that where they follow smooth functions)"
+            f'by the table "{self.name}" ({count} rows, t = {nstr(self.time(0), 8)} to '
+            f"{nstr(self.time(count - 1), 8)} s; with every other row left out interpolation misses the "
+            f"source's direction by at most {error.direction:.1e} rad and its distance by "
+            f"{error.distance:.1e} of it, with all rows by about "
+            f"{error.expected:.3f} of that where they follow smooth functions)"
         )
 
     # --- sizes ----------------------------------------------------------------------------------------------
 
-    def _each(self, name: str) -> list[Any]:
-        values = self._rows[name]
-        return values if isinstance(values, list) else [values]
-
     @cached_property
     def semi_major_axis(self) -> Any:
         """Semi-major axis, constant or the mean over the rows, m."""
-        axes = self._each(AXIS)
-        return sum(axes, self.context.zero) / len(axes)
+        axes = self._rows[AXIS]
+        return self.context.convert(axes.sum()) / len(axes) if isinstance(axes, np.ndarray) else axes
 
     @cached_property
     def largest_eccentricity(self) -> Any:
         """Largest eccentricity over the rows."""
-        sizes = _by_row(lambda k, h: self.context.sqrt(k * k + h * h), self._rows["k"], self._rows["h"])
-        return max(sizes) if isinstance(sizes, list) else sizes
+        k, h = (self._rows[name] for name in EXCENTRIC)
+        return self.context.sqrt(self.context.convert(np.max(k * k + h * h)))
 
-    @property
+    @cached_property
     def smallest_axis(self) -> Any:
         """Smallest semi-major axis over the rows, m."""
-        return min(self._each(AXIS))
+        return self.context.convert(np.min(self._rows[AXIS]))
 
     @property
     def pericentre(self) -> Any:
@@ -260,35 +327,26 @@ class TabulatedOrbit:
 
     def _fastest(self, pair: tuple[str, str]) -> Any:
         """Largest rate of a pair of elements between neighbouring rows, 1/s."""
-        times, largest = self.table.times, self.context.zero
-        if pair[0] not in self.moving:
-            return largest
-        one, other = (self._rows[name] for name in pair)
-        for i in range(len(times) - 1):
-            change = self.context.hypot(one[i + 1] - one[i], other[i + 1] - other[i])
-            largest = max(largest, change / (times[i + 1] - times[i]))
-        return largest
+        changes = [np.diff(x) for x in map(self._rows.get, pair) if isinstance(x, np.ndarray)]
+        if not changes:
+            return self.context.zero
+        squares = np.max(sum(x * x for x in changes) / np.diff(self.table.times) ** 2)
+        return self.context.sqrt(self.context.convert(squares))
 
     @property
     def longitude_exponent(self) -> int:
         """Binary exponent of a unit (rad) of which the mean longitude passes less than one over the table."""
-        span = self.table.times[-1] - self.table.times[0]
+        span = self.time(len(self.table.times) - 1) - self.time(0)
         return int(self.context.mag(self.motion(self.smallest_axis) * span)) + 1
 
     @cached_property
     def error(self) -> InterpolationError:
         """Interpolation errors, see ``interpolation_error``."""
-        names, times = (AXIS, *EXCENTRIC, *TILTED), self.table.times
-        elements = {name: _by_row(lambda x, _: x, self._rows[name], times) for name in names}
-        if LONGITUDE in self.moving:
-            elements[LONGITUDE] = self._rows[LONGITUDE]
-        return interpolation_error(times, elements, self.moving)
+        return interpolation_error(self.table.times, self._rows, self.moving)
 
 
-def _by_row(function: Callable[..., Any], *values: Any) -> Any:
-    """A function of columns or constants, row by row; of constants alone a constant."""
-    count = next((len(x) for x in values if isinstance(x, list)), None)
-    if count is None:
-        return function(*values)
-    columns = (x if isinstance(x, list) else [x] * count for x in values)
-    return [function(*row) for row in zip(*columns, strict=True)]
+def _alike(*values: Any) -> list[Any]:
+    """Values of which mpf are rounded to 80 bits if a column has no more."""
+    narrow = any(isinstance(x, np.ndarray) and x.dtype != object for x in values)
+    return [x if isinstance(x, np.ndarray) or not narrow else in_80_bits(np.array([x], dtype=object))[0]
+            for x in values]  # fmt: skip
