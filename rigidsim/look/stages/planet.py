@@ -16,12 +16,11 @@ from rigidsim.look import signals, sources
 from rigidsim.look.curves import loop_rows
 from rigidsim.look.fits import secular, turn_text
 from rigidsim.look.record import called, color_of, named_body, scene_of
-from rigidsim.look.signals import is_averaged
-from rigidsim.look.solids import Array, globe, graticule, pictured_globe
+from rigidsim.look.solids import Array, Mesh, globe, graticule, pictured_globe
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import FIELD, Subject, direction_of, eye_at, source_arrows
 from rigidsim.look.stages.parts import BODY, Camera, Color, Part, Picture, Stage, arrow, lines, trail
-from rigidsim.scene.bodies.presets import KNOWN, KnownBody
+from rigidsim.scene.bodies.presets import KNOWN
 from rigidsim.scene.readable import DAY, YEAR
 from rigidsim.scene.rotations import quaternion_of
 
@@ -48,55 +47,86 @@ _MARK = 0.03  # radius of the ring about longitude and latitude zero
 
 
 def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
-    """Picture of a large, nearly round body that spins nearly about its figure axis; None for others."""
-    axes = _semi_axes(subject)
-    poles = signals.near_axis(dataset, exactly=True) or "obliquity" in dataset or "polar_motion" in dataset
-    if axes is None or subject.position is not None or not poles:
+    """Picture of a large, nearly round body that spins nearly about its figure axis, and of any body without
+    attitude and rates whose figure axis or momentum is known; None for others.
+    """
+    figure, turns = scene_of(dataset).figure, subject.attitude is not None
+    still = not turns and "angular_velocity" not in dataset
+    sizes = _semi_axes(dataset, subject)
+    if subject.position is not None or not (still or sizes is not None):
         return None
-    preset = str(subject.solids[0].get("name", ""))
-    name = preset.partition("_")[0]
-    known = _known(name, float(axes.max()))
-    name = name or (known.name.lower() if known else "")
-    half, west = axes / axes.max(), _X_AXIS_WEST.get(preset, 0.0)
-    mapped = name in ("earth", "moon")
-    mesh = pictured_globe(half, name) if mapped else globe(half, color_of(known, _UNKNOWN))
-    figure = scene_of(dataset).figure
-    turns, averaged = subject.attitude is not None, "angular_velocity" not in dataset
-    if not turns and averaged:
-        subject = pointed(dataset, subject, figure)
-    beside = subject.attitude is None and moving_plane(dataset)
-    if beside and averaged:
-        subject = pointed(dataset, subject, figure, plane=True)
-    subject = replace(subject, meshes=[mesh.moved(_turn(west), np.zeros(3))], reach=float(axes.max()))
-    marks = _marks(half, figure, west, prime=turns or subject.attitude is None)
-    zero = f"{west:.4g}° west of Greenwich" if west else "at longitude zero"
-    notes = [f"continents: Natural Earth; the body's x axis is {zero}"] if name == "earth" else []
-    face = facing(dataset, subject, figure, marks)
-    if face is not None:
-        notes.append(face[1])
-    faces = [] if face is None else [face[0]]
-    title = name.capitalize() or "Planet"
-    called = {"": "a planet", "earth": "the Earth", "moon": "the Moon"}.get(name, name.capitalize())
-    if subject.attitude is None:
-        shown = [*_in_its_own_axes(dataset, figure, notes), *marks]
-        stage = subject.stage(shown, title, axes=0.0, camera=eye_of_pole(0.3, 1.75))
-        return Picture(f"rotation of {called}", [*faces, stage], notes)
-    pole = subject.attitude @ figure
-    shown = [arrow("figure_axis", "figure axis", parts.FIGURE, POLE_REACH * pole, "figure axis"), *marks]
+    axes, beside = _known_axes(dataset) if still else ({}, False)
+    if subject.attitude is not None:
+        axes = {"figure": subject.attitude @ figure}
+    if sizes is None and not axes:
+        return None
+    if still and "figure" in axes:
+        subject = _pointed(subject, figure, axes["figure"])
+    notes: list[str] = []
+    faces, shown, what = list[Stage](), list[Part](), "body"
+    kind, title = "axes in space", "Axes in space"
+    if sizes is not None:
+        what, west = "globe", _X_AXIS_WEST.get(str(subject.solids[0].get("name", "")), 0.0)
+        name, mesh = _globe(subject, sizes)
+        subject = replace(subject, meshes=[mesh.moved(_turn(west), np.zeros(3))], reach=float(sizes.max()))
+        marks = _marks(sizes / sizes.max(), figure, west, prime=turns or subject.attitude is None)
+        if name == "earth":
+            zero = f"{west:.4g}° west of Greenwich" if west else "at longitude zero"
+            notes.append(f"continents: Natural Earth; the body's x axis is {zero}")
+        face = facing(dataset, subject, figure, marks)
+        if face is not None:
+            faces, notes = [face[0]], [*notes, face[1]]
+        title = name.capitalize() or "Planet"
+        article = {"": "a planet", "earth": "the Earth", "moon": "the Moon"}.get(name, title)
+        kind, shown = f"rotation of {article} in space", marks
+        if subject.attitude is None:
+            shown = [*_in_its_own_axes(dataset, figure, notes), *marks]
+            stage = subject.stage(shown, title, axes=0.0, camera=_eye(0.3, 1.75))
+            return Picture(f"rotation of {article}", [*faces, stage], notes)
+    leading = next(iter(axes))
+    if leading == "momentum":
+        subject = replace(subject, meshes=[], points=np.empty((0, 3)))
+        rings = graticule(np.full(3, 0.6), lift=1.0)
+        shown = [lines("directions/0", parts.FAINT, rings, width=0.7, strength=0.4)]
+        notes.append("the body isn't drawn: of its attitude only the momentum's direction is known")
+    arrows = []
+    for name, axis in axes.items():
+        color = parts.FIGURE if name == "figure" else parts.MOMENTUM
+        tip, words = POLE_REACH * axis, f"{name} axis"
+        arrows.append(arrow(f"{name}_axis", words, color, tip, words))
+        # of samples too far apart it would be a cloud; on the circle of precession it wouldn't be seen
+        if still and signals.joined(tip, parts.NEAR) and np.ptp(axis[:, 2]) > _APART:
+            arrows += trail(f"{name}_path", color, tip, f"path of the {words}")
     if turns:
-        sources_there = source_arrows(dataset, SOURCE_REACH, balls=True)
-    else:
-        sources_there = [] if beside else followed_sources(dataset, notes)
+        arrows += source_arrows(dataset, SOURCE_REACH, balls=True)
+    elif not beside:
+        arrows += _followed_sources(dataset, notes)
     plane, place = reference_plane(dataset)
-    shown += [*sources_there, *plane, *circle_of_precession(dataset, pole, "figure", place, notes)]
-    if not turns and beside:
-        notes.append("the plane of reference moves in space: the globe is drawn as seen from it")
-    if not turns:
-        notes.append(standing_note(dataset, "globe"))
-    elif signals.aliased(dataset):
+    circle = circle_of_precession(dataset, axes[leading], leading, place, notes)
+    if beside:
+        notes.append(f"the plane of reference moves in space: the {what} is drawn as seen from it")
+    if still and leading == "figure":
+        averaged = signals.is_averaged(dataset.attrs)
+        why = "every rotation is averaged over" if averaged else "no attitude was recorded"
+        notes.append(f"{why}: the {what} points where its figure axis does, and doesn't turn about it")
+    elif turns and signals.aliased(dataset):
         notes.append("samples are half a turn apart or more: the globe's turning isn't seen")
-    stage = subject.stage(shown, title, axes=0.0, camera=eye_of_pole(), looked_from=place)
-    return Picture(f"rotation of {called} in space", [*faces, stage], notes)
+    shown = [*arrows, *shown, *plane, *circle]
+    stage = subject.stage(shown, title, axes=0.0, camera=_eye(), looked_from=place)
+    return Picture(kind, [*faces, stage], notes)
+
+
+def _globe(subject: Subject, sizes: Array) -> tuple[str, Mesh]:
+    """Name, if it is known or given, of a planet with these semi-axes (3,), m, and its mesh in radii."""
+    name, radius = str(subject.solids[0].get("name", "")).partition("_")[0], float(sizes.max())
+    known = named_body(name)
+    if not name:
+        near = min(KNOWN, key=lambda one: abs(one.radius - radius))
+        known = near if abs(near.radius / radius - 1) < _ALIKE else None
+        name = "" if known is None else known.name.lower()
+    if name in ("earth", "moon"):
+        return name, pictured_globe(sizes / radius, name)
+    return name, globe(sizes / radius, color_of(known, _UNKNOWN))
 
 
 def _marks(half: Array, figure: Array, west: float, *, prime: bool) -> list[Part]:
@@ -116,23 +146,15 @@ def _turn(degrees: float) -> Array:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _known(name: str, radius: float) -> KnownBody | None:
-    """The known planet with this name, or else with this equatorial radius (m); None if unknown."""
-    if name:
-        return named_body(name)
-    near = min(KNOWN, key=lambda one: abs(one.radius - radius))
-    return near if abs(near.radius / radius - 1) < _ALIKE else None
-
-
-def _semi_axes(subject: Subject) -> Array | None:
-    if len(subject.solids) != 1 or subject.solids[0].get("solid") not in ("ellipsoid", "sphere"):
+def _semi_axes(dataset: xarray.Dataset, subject: Subject) -> Array | None:
+    """Semi-axes (3,), m, of a globe whose poles have a meaning."""
+    poles = signals.near_axis(dataset, exactly=True) or "obliquity" in dataset or "polar_motion" in dataset
+    if len(subject.solids) != 1 or subject.solids[0].get("solid") not in ("ellipsoid", "sphere") or not poles:
         return None
-    sizes = subject.solids[0].get("dimensions", {})
-    axes = np.atleast_1d(np.asarray(sizes.get("semi_axes", sizes.get("radius", 0.0)), dtype=float))
-    axes = np.full(3, axes[0]) if axes.shape == (1,) else axes
-    if axes.shape != (3,) or not axes.min() > _LARGE or axes.min() < _ROUND * axes.max():
-        return None
-    return np.asarray(axes)
+    given = subject.solids[0].get("dimensions", {})
+    sizes = np.asarray(given.get("semi_axes", given.get("radius", 0.0)), dtype=float)
+    axes = np.broadcast_to(sizes, 3)
+    return axes if axes.min() > max(_LARGE, _ROUND * axes.max()) else None
 
 
 def _in_its_own_axes(dataset: xarray.Dataset, figure: Array, notes: list[str]) -> list[Part]:
@@ -163,64 +185,29 @@ def _in_its_own_axes(dataset: xarray.Dataset, figure: Array, notes: list[str]) -
     ]
 
 
-def axes_picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
-    """Picture of a body without attitude and rates whose figure axis or momentum is known in space; None for
-    others. A tumbling body, known by its momentum alone, isn't drawn.
-    """
-    if subject.attitude is not None or subject.position is not None or "angular_velocity" in dataset:
-        return None
-    known = {name: axis_in_space(dataset, name) for name in ("figure", "momentum")}
-    axes = {name: axis for name, axis in known.items() if axis is not None}
-    if not axes:
-        return None
-    leading = next(iter(axes))
-    if len(axes) == 2 and np.linalg.norm(axes["figure"] - axes["momentum"], axis=1).max() < _APART:
-        del axes["momentum"]
-    notes: list[str] = []
-    subject = pointed(dataset, subject, scene_of(dataset).figure)
-    shown: list[Part] = []
-    if leading == "figure":
-        notes.append(standing_note(dataset, "body"))
-    else:
-        subject = replace(subject, meshes=[], points=np.empty((0, 3)))
-        rings = graticule(np.full(3, 0.6), lift=1.0)
-        shown.append(lines("directions/0", parts.FAINT, rings, width=0.7, strength=0.4))
-        notes.append("the body isn't drawn: of its attitude only the momentum's direction is known")
-    for name, axis in axes.items():
-        color = parts.FIGURE if name == "figure" else parts.MOMENTUM
-        tip, words = POLE_REACH * axis, f"{name} axis"
-        shown.append(arrow(f"{name}_axis", words, color, tip, words))
-        # of samples too far apart it would be a cloud; on the circle of precession it wouldn't be seen
-        if signals.joined(tip, parts.NEAR) and np.ptp(axis[:, 2]) > _APART:
-            shown += trail(f"{name}_path", color, tip, f"path of the {words}")
-    plane, place = reference_plane(dataset)
-    shown += [*plane, *circle_of_precession(dataset, axes[leading], leading, place, notes)]
-    shown += followed_sources(dataset, notes)
-    stage = subject.stage(shown, "Axes in space", axes=0.0, camera=eye_of_pole(), looked_from=place)
-    return Picture("axes in space", [stage], notes)
-
-
-def eye_of_pole(height: float = 0.05, radius: float = 1.95) -> Camera:
+def _eye(height: float = 0.05, radius: float = 1.95) -> Camera:
     """The eye before a globe or axes, at which it looks at some height."""
     view = float(np.deg2rad(22.0)), float(np.deg2rad(-52.0))
     return eye_at(*view, radius, np.array([0.0, 0.0, height]))
 
 
-def axis_in_space(dataset: xarray.Dataset, axis: str) -> Array | None:
-    """Unit vectors (rows, 3), space axes, of the axis named figure or momentum, as recorded, or from
-    obliquity and node longitude if their plane is known and fixed; None where not all are known.
+def _known_axes(dataset: xarray.Dataset) -> tuple[dict[str, Array], bool]:
+    """Unit vectors (rows, 3) of the axes named figure and momentum, the latter if it is another, as far as
+    all are known: as recorded, or from obliquity and node longitude; and whether they are given along a plane
+    of reference that moves in space, or along space axes.
     """
-    found = signals.pole(dataset, axis)
-    plane = signals.reference_axes(dataset)
-    if found is None and plane is not None:
-        found = _against_plane(dataset, axis)
-        found = None if found is None else found @ plane[0]
-    return found if found is not None and np.isfinite(found).all() else None
-
-
-def moving_plane(dataset: xarray.Dataset) -> bool:
-    """Whether obliquity and node longitude refer to a plane that moves, or isn't known from the dataset."""
-    return signals.reference_axes(dataset) is None
+    found, plane, beside = dict[str, Array](), signals.reference_axes(dataset), False
+    for name in ("figure", "momentum"):
+        axis = signals.pole(dataset, name)
+        if axis is None:
+            axis = _against_plane(dataset, name)
+            beside = beside or (axis is not None and plane is None)
+            axis = axis if axis is None or plane is None else axis @ plane[0]
+        if axis is not None and np.isfinite(axis).all():
+            found[name] = axis
+    if len(found) == 2 and np.linalg.norm(found["figure"] - found["momentum"], axis=1).max() < _APART:
+        del found["momentum"]
+    return found, beside
 
 
 def _against_plane(dataset: xarray.Dataset, axis: str) -> Array | None:
@@ -234,13 +221,10 @@ def _against_plane(dataset: xarray.Dataset, axis: str) -> Array | None:
     return np.stack([np.sin(tilt) * np.sin(node), -np.sin(tilt) * np.cos(node), np.cos(tilt)], axis=1)
 
 
-def pointed(dataset: xarray.Dataset, subject: Subject, figure: Array, *, plane: bool = False) -> Subject:
-    """The subject with an attitude whose figure axis (3,), body axes, is the recorded one, without rotation
-    about it; itself if none is known. With `plane`, relative to the reference plane, which may move in space.
+def _pointed(subject: Subject, figure: Array, pole: Array) -> Subject:
+    """The subject with an attitude whose figure axis (3,), body axes, is the pole (rows, 3), without rotation
+    about it.
     """
-    pole = _against_plane(dataset, "figure") if plane else axis_in_space(dataset, "figure")
-    if pole is None or not np.isfinite(pole).all():
-        return subject
     node = np.stack([-pole[:, 1], pole[:, 0], np.zeros(len(pole))], axis=1)
     node[np.hypot(pole[:, 0], pole[:, 1]) < _UPRIGHT] = (1.0, 0.0, 0.0)
     node -= np.sum(node * pole, axis=1, keepdims=True) * pole
@@ -251,13 +235,7 @@ def pointed(dataset: xarray.Dataset, subject: Subject, figure: Array, *, plane: 
     return replace(subject, attitude=attitude, quaternion=quaternion_of(attitude))
 
 
-def standing_note(dataset: xarray.Dataset, what: str) -> str:
-    """Why a body that was `pointed` doesn't turn."""
-    why = "every rotation is averaged over" if is_averaged(dataset.attrs) else "no attitude was recorded"
-    return f"{why}: the {what} points where its figure axis does, and doesn't turn about it"
-
-
-def followed_sources(dataset: xarray.Dataset, notes: list[str]) -> list[Part]:
+def _followed_sources(dataset: xarray.Dataset, notes: list[str]) -> list[Part]:
     """Directions of sources that advance little enough from row to row for the eye to follow."""
     seconds = signals.seconds(dataset)
     step = float(np.abs(np.diff(seconds)).mean()) if len(seconds) > 1 else 0.0

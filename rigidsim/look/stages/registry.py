@@ -109,7 +109,6 @@ KINDS: tuple[Callable[[xarray.Dataset, Subject], Picture | None], ...] = (
     orbits.flight,
     orbits.satellite,
     planet.picture,
-    planet.axes_picture,
     free,
 )
 """Functions that return the picture of a scene of their kind, or None for others; the first that has one."""
