@@ -55,32 +55,14 @@ def build_blueprint(
     if run.states:
         right.append(rrb.StateTimelineView(origin="/states", name="Events"))
         heights.append(1.2)
-    panel = time_panel(clock, run.screen_seconds, following=following)
-    if part is None:
-        return page_of(left, right, panel, heights)
-    if part == PLAYER:
-        below = rrb.Vertical(left, *right[:1], row_shares=[5, 2][: 1 + len(right)])
-        return rrb.Blueprint(
-            below,
-            rrb.TopPanel(state="hidden"),
-            rrb.BlueprintPanel(state="hidden"),
-            rrb.SelectionPanel(state="hidden"),
-            panel,
-        )
-    return bare(left, rrb.Vertical(*right, row_shares=heights) if right else None, clock, part)
-
-
-def bare(left: rrb.Container, right: rrb.Container | None, clock: Clock, part: str) -> rrb.Blueprint:
-    """A part of the page, without the viewer's own bars."""
-    both = left if right is None else rrb.Horizontal(left, right, column_shares=[5, 3.4])
-    content = {"page": both, "scene": left, "plots": right or left}[part]
-    return rrb.Blueprint(
-        content,
-        rrb.TopPanel(state="hidden"),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        rrb.TimePanel(state="hidden", timeline=clock.name),
-    )
+    panel = time_panel(clock, run.screen_seconds, following=following, hidden=part in PARTS)
+    whole = beside_plots(left, right, heights)
+    shown: dict[str | None, rrb.View | rrb.Container] = {
+        "scene": left,
+        "plots": rrb.Vertical(*right, row_shares=heights) if right else left,
+        PLAYER: rrb.Vertical(left, *right[:1], row_shares=[5, 2][: 1 + len(right)]),
+    }
+    return page_of(shown.get(part, whole), panel, hidden=part is not None)
 
 
 def build_comparison(
@@ -112,23 +94,25 @@ def build_comparison(
         entities.legend_of([stage for run in runs for stage in run.picture.stages]),
         {page.lower(): name for name, run in named for page in run.pages},
     )
-    if not bars:
-        return bare(left, rrb.Vertical(*views) if views else None, clock, "page")
-    return page_of(left, views, time_panel(clock, max(run.screen_seconds for run in runs), following=False))
+    panel = time_panel(clock, max(run.screen_seconds for run in runs), hidden=not bars)
+    return page_of(beside_plots(left, views), panel, hidden=not bars)
 
 
-def page_of(
-    left: rrb.Container,
-    right: Sequence[rrb.View | rrb.Container],
-    panel: rrb.TimePanel,
-    heights: Sequence[float] | None = None,
-) -> rrb.Blueprint:
+def beside_plots(
+    left: rrb.Container, right: Sequence[rrb.View | rrb.Container], heights: Sequence[float] | None = None
+) -> rrb.Container:
     """The scene with plots beside it, if there are any."""
-    content = left
-    if right:
-        content = rrb.Horizontal(left, rrb.Vertical(*right, row_shares=heights), column_shares=[5, 3.4])
+    if not right:
+        return left
+    return rrb.Horizontal(left, rrb.Vertical(*right, row_shares=heights), column_shares=[5, 3.4])
+
+
+def page_of(content: rrb.View | rrb.Container, panel: rrb.TimePanel, *, hidden: bool) -> rrb.Blueprint:
+    """A page, of a picture without the viewer's own bars."""
+    state = "hidden" if hidden else "collapsed"
+    bars = [rrb.TopPanel(state="hidden")] if hidden else []
     return rrb.Blueprint(
-        content, rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), panel
+        content, rrb.BlueprintPanel(state=state), rrb.SelectionPanel(state=state), *bars, panel
     )
 
 
@@ -161,8 +145,12 @@ def tabs(views: Sequence[rrb.View | rrb.Container]) -> rrb.View | rrb.Container:
     return views[0] if len(views) == 1 else rrb.Tabs(*views, active_tab=0)
 
 
-def time_panel(clock: Clock, screen: float, *, following: bool) -> rrb.TimePanel:
+def time_panel(
+    clock: Clock, screen: float, *, following: bool = False, hidden: bool = False
+) -> rrb.TimePanel:
     """The time panel: at the start, playing, the whole run in so many seconds."""
+    if hidden:
+        return rrb.TimePanel(state="hidden", timeline=clock.name)
     span = float(abs(clock.ticks[-1] - clock.ticks[0])) or 1.0
     return rrb.TimePanel(
         state="collapsed",

@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +18,12 @@ from rerun.error_utils import set_strict_mode, strict_mode
 
 from rigidsim.look.pages import legible
 from rigidsim.look.plots import HUES, PALETTE, Plot
+from rigidsim.look.signals import seconds as seconds_of
 from rigidsim.look.signals import title_of, values
-from rigidsim.look.solids import Array, Color
+from rigidsim.look.solids import Array
 from rigidsim.look.stages.uncertainty import CONE
 from rigidsim.look.timeline.blueprint import PIXELS, build_blueprint, build_comparison
-from rigidsim.look.timeline.drawn import Clock, DrawnRun, build_clock, dated
+from rigidsim.look.timeline.drawn import DrawnRun, build_clock, dated
 from rigidsim.scene.parts_of_values import in_time_order
 from rigidsim.scene.readable import epoch_of
 from rigidsim.scene.row_rotations import angles_between, normalised
@@ -31,6 +33,7 @@ _ROW_BYTES = 600  # at most: some twenty variables
 _FIRST_BYTES = 1024 * _ROW_BYTES  # bodies, layout, page
 MOST = 6  # largest number of runs shown side by side
 ROWS = 20_000  # largest number of rows shown of each run
+_SHADES = (1.0, 0.62, 1.35, 0.8)  # of a run's colour, by curve
 _FLOOR = 1e-18  # rad: below what a difference of attitudes in double precision can be
 
 
@@ -101,30 +104,26 @@ def check_room(path: Path, rows: int) -> None:
 
 
 class LiveRecording:
-    """A recording that grows with a run, by `rows` so far, on a stream to a viewer or a file."""
+    """A recording that grows with a run, on a stream to a viewer or a file."""
 
     def __init__(self, stream: rr.RecordingStream) -> None:
         self._stream = stream
         self._scales: tuple[object, ...] = ()
         self._last = -1
-        self.rows = 0
 
     def update(self, dataset: xarray.Dataset) -> None:
         """Send the new rows of all so far; everything where the scales have changed with them."""
         if dataset.sizes["time"] - 1 == self._last:  # nothing is new
             return
         run = DrawnRun.of(dataset, LIVE_ROWS)
-        steps = run.steps
         with strict():
             scales = _scales_of(run)
             if scales != self._scales:
                 self._scales, self._last = scales, -1
                 self._stream.send_blueprint(build_blueprint(run, following=True))
                 self._stream.send_recording_name(legible(title_of(dataset)))
-            first = int(np.searchsorted(steps, self._last, side="right"))
-            run.draw(self._stream, first)
-            self.rows += len(steps) - first
-        self._last = int(steps[-1])
+            run.draw(self._stream, int(np.searchsorted(run.steps, self._last, side="right")))
+        self._last = int(run.steps[-1])
         self._stream.flush()
 
 
@@ -162,16 +161,16 @@ def write_comparison(
     if not 2 <= len(named) <= MOST:
         raise ValueError(f"given {len(named)} runs; 2 to {MOST} can be seen side by side")
     runs = [(name, DrawnRun.of(in_time_order(dataset), rows)) for name, dataset in named]
-    clock = build_clock(np.unique(np.concatenate([run.seconds for _, run in runs])))
+    seconds = np.unique(np.concatenate([run.seconds for _, run in runs]))
     first, *others = [epoch_of(run.rows.attrs) for _, run in runs]
-    shown = dated(clock, first) if all(epoch == first for epoch in others) else clock
-    drawn = [
-        _named(replace(run, clock=_part(clock, shown, run.seconds)), name, number)
-        for number, (name, run) in enumerate(runs)
-    ]
+    clock = dated(build_clock(seconds), first if all(epoch == first for epoch in others) else None)
+    drawn = []
+    for number, (name, run) in enumerate(runs):
+        ticks = clock.ticks[np.searchsorted(seconds, run.seconds)]
+        drawn.append(_named(replace(run, clock=replace(clock, ticks=ticks)), name, number))
     apart = attitude_differences([(name, run.rows) for name, run in runs])
     titles = [legible(name) for name, _ in named]
-    blueprint = build_comparison(list(zip(titles, drawn, strict=True)), shown, apart, bars=bars)
+    blueprint = build_comparison(list(zip(titles, drawn, strict=True)), clock, apart, bars=bars)
     if apart is not None:
         drawn[0].plots.append(apart)
     stages = [stage for run in drawn for stage in run.picture.stages]
@@ -180,13 +179,6 @@ def write_comparison(
         for run in drawn:
             run.draw(recording, legend=stages if run is drawn[0] else ())
     return count
-
-
-def _part(clock: Clock, shown: Clock, seconds: Array) -> Clock:
-    """The common clock as it is shown, with dates or without, for the times of one run."""
-    whole = np.asarray(clock.ticks * clock.seconds_per_tick)
-    places = np.clip(np.searchsorted(whole, seconds - 0.5 * clock.seconds_per_tick), 0, len(whole) - 1)
-    return replace(shown, ticks=shown.ticks[places])
 
 
 def _named(run: DrawnRun, name: str, number: int) -> DrawnRun:
@@ -198,13 +190,15 @@ def _named(run: DrawnRun, name: str, number: int) -> DrawnRun:
         for part in first.parts
     ]
     stage = replace(first, root=f"{root}/{first.root}", title=f"{title}: {first.title}", parts=drawn)
+    color = np.array(HUES[PALETTE[number]][1])
+    shades = [np.minimum(np.rint(part * color), 255).astype(int).tolist() for part in _SHADES]
     plots = [
         replace(
             plot,
             name=f"{root} {plot.name}",
             labels=[f"{title}: {label or plot.word}" for label in plot.labels],
             levels={f"{title}: {label}": value for label, value in plot.levels.items()},
-            hues=[_shade(HUES[PALETTE[number]][1], k) for k in range(len(plot.labels))],
+            hues=shades,
         )
         for plot in run.plots
         if plot.place != "more"
@@ -214,44 +208,24 @@ def _named(run: DrawnRun, name: str, number: int) -> DrawnRun:
     return replace(run, picture=picture, plots=plots, paths=[], states=[], pages=pages)
 
 
-def _shade(color: Color, number: int) -> Color:
-    """The colour of a run, brighter for its second curve and darker for its third."""
-    part = (1.0, 0.62, 1.35, 0.8)[number % 4]
-    red, green, blue = (min(round(part * x), 255) for x in color)
-    return red, green, blue
-
-
 def attitude_differences(named: Sequence[tuple[str, xarray.Dataset]]) -> Plot | None:
     """The angle (rad) between the first run's attitude and each other's, at the first run's times,
     where quaternions are interpolated on the chord. None if the first has no attitude, or no other has one
     then.
     """
-    (_, first), *others = named
-    base = values(first, "quaternion")
-    if base is None:
-        return None
-    times = np.asarray(first["time"].values, dtype=np.float64)
-    base = normalised(base)
-    labels, columns = [], []
+    (leading, first), *others = named
+    found: dict[str, Array] = {}
     for name, table in others:
-        quaternion = values(table, "quaternion")
-        if quaternion is None:
+        base, theirs = values(first, "quaternion"), values(table, "quaternion")
+        if base is None or theirs is None:
             continue
-        theirs = _at(times, np.asarray(table["time"].values, dtype=np.float64), quaternion)
-        angle = angles_between(base, theirs)
+        turned = np.einsum("ij,ij->i", theirs[1:], theirs[:-1]) < 0
+        theirs = theirs * np.append(1.0, np.cumprod(np.where(turned, -1.0, 1.0)))[:, None]
+        at = partial(np.interp, seconds_of(first), seconds_of(table), left=np.nan, right=np.nan)
+        angle = angles_between(normalised(base), normalised(np.stack([*map(at, theirs.T)], axis=1)))
         if np.isfinite(angle).any():
-            labels.append(f"{legible(name)} from {legible(named[0][0])}")
-            columns.append(np.maximum(angle, _FLOOR))
-    title, place = "Angle between the attitudes", "drift"
-    if not columns:
+            found[f"{legible(name)} from {legible(leading)}"] = np.maximum(angle, _FLOOR)
+    if not found:
         return None
-    hues = PALETTE[1:]  # of the others
-    return Plot("difference", title, np.stack(columns, axis=1), labels, "rad", hues, place=place, log=True)
-
-
-def _at(times: Array, theirs: Array, quaternion: Array) -> Array:
-    """Unit quaternions at given times: as sampled, on the chord between two samples, nan elsewhere."""
-    changes = np.einsum("ij,ij->i", quaternion[1:], quaternion[:-1]) < 0
-    steady = quaternion * np.append(1.0, np.cumprod(np.where(changes, -1.0, 1.0)))[:, None]
-    columns = [np.interp(times, theirs, column, left=np.nan, right=np.nan) for column in steady.T]
-    return normalised(np.stack(columns, axis=1))
+    title, table, hues = "Angle between the attitudes", np.stack([*found.values()], axis=1), PALETTE[1:]
+    return Plot("difference", title, table, [*found], "rad", hues, place="drift", log=True)
