@@ -32,7 +32,7 @@ from rigidsim.model.rotations import Symbolic, SymbolicMatrix, apply, length, tr
 from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling
 from rigidsim.model.state_blocks import BODY, AttitudeStates, RotatingBody
 from rigidsim.model.two_part import as_factor
-from rigidsim.scene.arithmetic import Matrix, Vector, cross, dot, negligible
+from rigidsim.scene.arithmetic import Matrix, Vector, cross, diagonal, dot, negligible
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import Expression
@@ -444,3 +444,9 @@ def quadratic_form(m: Kinematics, direction: list[Symbolic]) -> Symbolic:
 def inertia_times(m: Kinematics, direction: list[Symbolic]) -> list[Symbolic]:
     """I c for a direction c in body axes, internal units of inertia."""
     return product(m.mass_tensor, direction)
+
+
+def along_axes(m: Kinematics, size: Any, exponent: int, parts: Sequence[Symbolic]) -> list[Term]:
+    """A vector's components as terms, times a constant (mpf) and a power of two."""
+    constant = m.scene.context.ldexp(size, exponent)
+    return list(zip(diagonal([constant] * 3), parts, strict=True))

@@ -220,7 +220,6 @@ class Placement:
         sights: bodies of a kernel that it is placed by, see ``SceneLoad``.
         falling: of one seen from an origin that the source accelerates, its place from there.
         untracked: why velocity and acceleration aren't known; empty if they are, by ``motion``.
-        without_elements: why it has no ellipse to average over, and what to do; None if it has one, or rests.
     """
 
     name: str = ""
@@ -242,7 +241,6 @@ class Placement:
     sights: tuple[tuple[RelativeEphemeris, int], ...] = ()
     falling: Placement | None = None
     untracked: str = "only its place is known"
-    without_elements: tuple[str, str] | None = None
 
     def seen(self, m: Kinematics) -> SourcePlace:
         """Where it is."""
@@ -457,10 +455,6 @@ class PlacedBySeries(Placement):
     wide = True
     of_time = True
     untracked = "its place is an analytic series"
-    without_elements = (
-        "the source of an ephemeris has no elements to average over",
-        'choose "spin_averaged", or give it an orbit with a node_rate',
-    )
 
     @property
     def plane(self) -> OrbitPlane | None:  # type: ignore[override]
@@ -557,16 +551,6 @@ class PlacedAsMass(AmongMasses):
     def pair(self) -> PointMassPair:
         """It, and the one that the body is."""
         return PointMassPair(self.masses, self.number)
-
-    @property
-    def without_elements(self) -> tuple[str, str]:  # type: ignore[override]
-        return (
-            f'the orbit of the point mass "{self.name}" is integrated, so that there is no ellipse to '
-            "average over"
-        ), (
-            'choose "spin_averaged", or write the elements of the orbit into a table (orbit = {table = '
-            '"elements.csv"})'
-        )
 
     def distance(self, context: Any) -> Any:
         """Semi-major axis at the start, or the least distance of one that isn't bound."""
@@ -673,13 +657,6 @@ class PlacedByKernel(Placement):
     @property
     def lunisolar(self) -> bool:  # type: ignore[override]
         return {self.sight.source, self.sight.host} <= _LUNISOLAR
-
-    @property
-    def without_elements(self) -> tuple[str, str]:  # type: ignore[override]
-        return (
-            f'the kernel gives places of "{self.name}", and no elements to average over',
-            'choose "spin_averaged", or give it an orbit with a node_rate',
-        )
 
     def distance(self, context: Any) -> Any:
         return context.ldexp(context.mpf(1000), self.sight.exponent)

@@ -12,7 +12,6 @@ from typing import Any
 
 from rigidsim.errors import required
 from rigidsim.model.load import Load
-from rigidsim.model.load_words import ASTRONOMICAL_UNIT, length_text, span_words
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, dot, hansen, norm
 from rigidsim.scene.bodies.presets import KNOWN, KnownBody, known_body
@@ -20,7 +19,7 @@ from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.orbits import MEAN_MOTION_KEYS, Elements, KeplerOrbit
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
-from rigidsim.scene.readable import span_text
+from rigidsim.scene.readable import ASTRONOMICAL_UNIT, length_text, span_text
 from rigidsim.scene.registry import LoadFields
 from rigidsim.scene.scene import Scene
 
@@ -244,10 +243,10 @@ def _about_period(
     if least * (1 - _PERTURBED) <= needed <= most * (1 + _PERTURBED) or other:
         return
     axis = orbit.semi_major_axis
-    kepler = span_words(2 * math.pi * math.sqrt(axis**3 / most))
+    kepler = span_text(float(2 * math.pi * math.sqrt(axis**3 / most)), 4)
     yield Caution(
         WarningCode.PERIOD_CONTRADICTS,
-        f"{where}.{key}: a turn takes {span_words(2 * math.pi / abs(orbit.mean_motion))}, while by "
+        f"{where}.{key}: a turn takes {span_text(float(2 * math.pi / abs(orbit.mean_motion)), 4)}, while by "
         f"Kepler's third law with this gravitational_parameter an orbit of {length_text(float(axis))} takes "
         f"{kepler}; correct one of them, or leave {key} out",
     )

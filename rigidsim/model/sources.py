@@ -36,7 +36,6 @@ import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.load_words import length_text
 from rigidsim.model.names import in_si
 from rigidsim.model.placements import SourcePlace
 from rigidsim.model.rotations import apply, transpose
@@ -47,6 +46,7 @@ from rigidsim.scene.arithmetic import transpose as transposed
 from rigidsim.scene.attitude import rotation_matrix
 from rigidsim.scene.expressions.names import PLACES, NameProvider, Readable, provides
 from rigidsim.scene.expressions.tree import names_used
+from rigidsim.scene.readable import length_text
 from rigidsim.scene.registry import LoadFields
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config

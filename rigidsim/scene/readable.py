@@ -22,6 +22,7 @@ DAY = 86400.0
 YEAR = 365.25 * DAY
 """Julian year, s: the unit ``yr`` of configs."""
 _J2000_YEAR = 2000.0
+ASTRONOMICAL_UNIT = 149597870700.0  # m
 _LONG = ((1e9 * YEAR, "Gyr"), (1e6 * YEAR, "Myr"), (1e3 * YEAR, "kyr"))
 _CALENDAR = ((YEAR, "yr"), (DAY, "d"), (3600.0, "h"), (60.0, "min"))
 _SHORT = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"), (1e-12, "ps"), (1e-15, "fs"))
@@ -90,6 +91,21 @@ def period_text(seconds: float, attributes: Mapping[str, Any], digits: int = 5) 
     """A time span in the unit that a run's attributes ask for, if it counts 1 to 10,000 of these."""
     unit = unit_of(attributes, seconds)
     return span_text(seconds, digits, unit if 1 <= abs(seconds) / unit.seconds < 1e4 else None)
+
+
+def value_text(value: Any, unit: str, digits: int = 4) -> str:
+    """A number with its unit."""
+    return f"{number_text(float(value), digits)} {unit}"
+
+
+def length_text(length: float) -> str:
+    """A length in m, km or au."""
+    size, unit = next(
+        (size, unit)
+        for least, size, unit in ((1e10, ASTRONOMICAL_UNIT, "au"), (1e4, 1e3, "km"), (0.0, 1.0, "m"))
+        if length >= least
+    )
+    return value_text(length / size, unit)
 
 
 def instant_text(epoch: Epoch, seconds: float, span: float) -> str:

@@ -6,7 +6,6 @@ from typing import Any
 from rigidsim.model.formulations.formulation import ModelPlan
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.load_estimate import effects_at_start
-from rigidsim.model.load_words import length_text
 from rigidsim.model.loads.gravity import UniformGravity
 from rigidsim.model.placements import FlownByKernel
 from rigidsim.model.plausibility import about_load, about_named_strength
@@ -16,7 +15,7 @@ from rigidsim.scene.arithmetic import Vector, norm, working_bits
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import ConfigTable
-from rigidsim.scene.readable import TimeWords, number_text
+from rigidsim.scene.readable import TimeWords, length_text, number_text
 from rigidsim.scene.registry import LOADS
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config

@@ -102,7 +102,8 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
     unfit = [load.unaveraged for load in loads if load.unaveraged is not None]
     odd = [load.title for load in alone if not reads_rates_alone(load)]
     kinks = surfaces_of(scene).found if alone and not odd else []
-    unsuited = [x for source in sources if (x := source.placement.without_elements)] if over_orbits else []
+    places = [source.placement for source in sources if over_orbits]
+    unsuited = [x.name for x in places if not (x.orbit or x.table or x.rests)]
     said = [
         (scene.free_flight, "the body has a position and flies", ""),
         (carried_beside(loads), carried_beside(loads), ""),
@@ -132,7 +133,8 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
         (scene.bodies is not None and scene.bodies.full,
          'coupling = "full" makes the bodies feel every rotation of this one',
          f'set [body] coupling to "one_way", or {_FULL}'),
-        *((True, *why) for why in unsuited),
+        *((True, f"the source {name or 'by series'} has no elements to average over",
+           'choose "spin_averaged", or give it an orbit by elements or a table') for name in unsuited),
     ]  # fmt: skip
     for holds, against, remedy in said:
         if holds:

@@ -24,7 +24,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import Field
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.kinematics import Kinematics, along_axes
 from rigidsim.model.load import Load, Term
 from rigidsim.model.names import written
 from rigidsim.model.rotations import Symbolic, apply, transpose
@@ -131,8 +131,7 @@ class Torque(Applied):
     unit = "N m"
 
     def torque(self, m: Kinematics) -> list[Term]:
-        size = m.scene.context.ldexp(m.scene.context.one, -m.scaling.energy)
-        return list(zip(diagonal([size] * 3), self._in_body(m), strict=True))
+        return along_axes(m, 1, -m.scaling.energy, self._in_body(m))
 
 
 @register_load
@@ -155,12 +154,21 @@ class Force(Applied):
         """Acceleration of a freely flying body: the force over its mass."""
         if m.velocity is None:
             return []
-        context = m.scene.context
         found = written(m, self.components)
         if self.frame == "body":
             found = apply(m.matrix, found)
-        size = context.ldexp(1 / m.carried(m.scene.body.mass), m.scaling.time - m.scaling.speed)
-        return list(zip(diagonal([size] * 3), found, strict=True))
+        return along_axes(m, 1 / m.carried(m.scene.body.mass), m.scaling.time - m.scaling.speed, found)
+
+
+def _against_rates(m: Kinematics, damping: Matrix, factor: Symbolic | None = None) -> list[Term]:
+    """Torque -D w of a constant matrix (mpf, kg m^2/s), perhaps times a factor."""
+    terms: list[Term] = []
+    for column, (state, unit) in enumerate(zip(m.rate_states, m.numbers.rate_units, strict=True)):
+        size = m.scene.context.ldexp(unit, -m.scaling.momentum)
+        vector = [-size * row[column] for row in damping]
+        if any(x != 0 for x in vector):
+            terms.append((vector, state if factor is None else factor * state))
+    return terms
 
 
 class ViscousTorqueFields(LoadFields):
@@ -196,14 +204,7 @@ class ViscousTorque(Load):
         return scene.context.zero  # it only removes energy
 
     def torque(self, m: Kinematics) -> list[Term]:
-        context = m.scene.context
-        terms: list[Term] = []
-        for i, coefficient in enumerate(self.coefficients):
-            if coefficient != 0:
-                scaled = context.ldexp(coefficient, -m.scaling.momentum)
-                vector = [-scaled * m.numbers.rate_units[i] if i == j else context.zero for j in range(3)]
-                terms.append((vector, m.rate_states[i]))
-        return terms
+        return _against_rates(m, diagonal(self.coefficients))
 
 
 class MassLossFields(LoadFields):
@@ -276,7 +277,6 @@ class MassLoss(Load):
 
     def torque(self, m: Kinematics) -> list[Term]:
         """Refused with a weight, whose torque is for a constant mass."""
-        context, scaling = m.scene.context, m.scaling
         if m.scene.torque_arm is not None:
             raise ConfigError(
                 Problem(
@@ -285,13 +285,8 @@ class MassLoss(Load):
                     "weight takes a constant mass; hold it at its centre of mass",
                 )
             )
-        (rate,), terms = written(m, [self.rate]), []
-        for column, (state, unit) in enumerate(zip(m.rate_states, m.numbers.rate_units, strict=True)):
-            size = context.ldexp(unit, -scaling.time - scaling.energy)
-            vector = [-size * row[column] for row in self.geometry]
-            if any(x != 0 for x in vector):
-                terms.append((vector, rate * state))
-        return terms
+        (rate,) = written(m, [self.rate])
+        return _against_rates(m, self.geometry, rate)
 
     def never_negative(self) -> list[Expression]:
         return [self.rate]

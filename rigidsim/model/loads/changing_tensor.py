@@ -57,7 +57,6 @@ from rigidsim.model.kinematics import (
     inertia_times,
 )
 from rigidsim.model.load import Load, loads_of
-from rigidsim.model.load_words import span_words
 from rigidsim.model.loads.gravity import Attraction
 from rigidsim.model.mechanics import Carrier, Mechanics
 from rigidsim.model.names import written
@@ -76,6 +75,7 @@ from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.kernels.reading import RelativeEphemeris
 from rigidsim.scene.moving_moments import formulas_of, least_part
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
+from rigidsim.scene.readable import span_text
 from rigidsim.scene.registry import Setting, names_of, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
@@ -710,8 +710,8 @@ class Elasticity(Load, Carrier):
         if (angle := self.turned_within(scene)) > _TOO_LATE:
             raise fault(
                 "delay",
-                f"given {span_words(plain(self.delay))}, in which body and source turn by {angle:.3g} "
-                f"rad; up to {_TOO_LATE:g} is allowed, since what it does is a series in it",
+                f"given {span_text(float(plain(self.delay)), 4)}, in which body and source turn by "
+                f"{angle:.3g} rad; up to {_TOO_LATE:g} is allowed, since what it does is a series in it",
             )
         least, count = working_epsilon(scene.context) / 4, 0
         left = distorted * factor
@@ -835,8 +835,8 @@ def _about_delay(delay: Any, turned: float) -> Iterator[Caution]:
     if turned > _LATE:
         yield Caution(
             WarningCode.DELAY_TOO_LONG,
-            f"{WHERE} delay: in {span_words(delay)} body and source turn by {turned:.2g} rad, of which "
-            f"the expansion to second order leaves out some {turned**2 / 6:.1%} of what the delay does",
+            f"{WHERE} delay: in {span_text(float(delay), 4)} body and source turn by {turned:.2g} "
+            f"rad, of which the expansion to second order leaves out some {turned**2 / 6:.1%} of what the delay does",
         )
 
 

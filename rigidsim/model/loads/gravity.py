@@ -48,9 +48,8 @@ from pydantic import Field, StrictInt, StrictStr, Tag
 from rigidsim.errors import ConfigError, Problem, required
 from rigidsim.model.earth_pole import earth_pole
 from rigidsim.model.harmonics import Harmonics, Series, TurningHarmonics, frame_of, turning
-from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
+from rigidsim.model.kinematics import Kinematics, along_axes, inertia_times, quadratic_form
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import length_text
 from rigidsim.model.orbits import Pull
 from rigidsim.model.placements import (
     AmongMasses,
@@ -106,6 +105,7 @@ from rigidsim.scene.orbits import (
     resolve_tabulated_orbit,
 )
 from rigidsim.scene.point_masses import PointMasses
+from rigidsim.scene.readable import length_text
 from rigidsim.scene.registry import LoadFields, SceneLoad, Setting, SourceFields, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.space_axes import ECLIPTIC
@@ -208,7 +208,7 @@ class ByPlacedSource(Placed):
         if not self.pulls:
             return []
         sign, parts = self.acceleration(m)
-        return [([sign * x for x in e], y) for e, y in zip(unit_vectors(m.scene.context), parts, strict=True)]
+        return along_axes(m, sign, 0, parts)
 
     def reaction(self, m: Kinematics) -> list[Pull]:
         if not (self.reacts and isinstance(self.placement, AmongMasses) and self.placement.masses.full):
@@ -265,7 +265,7 @@ class Attraction(ByPlacedSource):
         strength, factor = 3 * self.per_distance(m, place, 3, 2 * m.scaling.time), place.inverse**3
         if m.shape is not None:
             turned = cross(line, inertia_times(m, line))
-            return along_axes(m, strength, [factor * x for x in turned])
+            return along_axes(m, strength, 0, [factor * x for x in turned])
         return tensor_terms(m, strength, lambda a, j: factor * (line[a] * line[j]))
 
     def potential(self, m: Kinematics) -> Symbolic | None:
@@ -345,11 +345,6 @@ def tensor_terms(m: Kinematics, strength: Any, element: Callable[[int, int], Sym
     return terms
 
 
-def along_axes(m: Kinematics, strength: Any, parts: list[Symbolic]) -> list[Term]:
-    """A vector's components as terms, times a constant (mpf)."""
-    return [([strength * x for x in e], y) for e, y in zip(unit_vectors(m.scene.context), parts, strict=True)]
-
-
 def trace(m: Kinematics) -> Any:
     """tr I, internal units of inertia."""
     if m.shape is not None:
@@ -411,7 +406,7 @@ class BodyField(ByPlacedSource):
         return seen.turned(self.coefficients, lambda n: self._energy(m, place, n), place.inverse, 1)
 
     def torque(self, m: Kinematics) -> list[Term]:
-        terms = along_axes(m, m.scene.context.one, self._torque(m))
+        terms = along_axes(m, 1, 0, self._torque(m))
         return [term for term in terms if term[1] != hy.expression(0.0)]
 
     def potential(self, m: Kinematics) -> Symbolic | None:
@@ -570,7 +565,7 @@ class SourceFigure(ByPlacedSource):
             pairs = ((u, v), (v, u)), ((p, p),)
             mixed, own = ([cross(a, inertia_times(m, b)) for a, b in pair] for pair in pairs)
             sums = [0.5 * (x + y) - fifths * z for x, y, z in zip(*mixed, *own, strict=True)]
-            return along_axes(m, strength, [factor * x for x in sums])
+            return along_axes(m, strength, 0, [factor * x for x in sums])
         return tensor_terms(
             m,
             strength,

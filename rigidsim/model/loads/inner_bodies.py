@@ -43,7 +43,6 @@ import heyoka as hy
 from rigidsim.errors import ConfigError, Problem, required
 from rigidsim.model.kinematics import Kinematics, in_common_unit
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import value_text
 from rigidsim.model.names import in_si, written
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import exponent, largest_rates
@@ -55,6 +54,7 @@ from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.expressions.names import NameProvider, Readable, provides
 from rigidsim.scene.expressions.tree import Expression, states_read
 from rigidsim.scene.frame import unique_axis
+from rigidsim.scene.readable import value_text
 from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.rotors import RotorTable
 from rigidsim.scene.scene import Scene

@@ -16,16 +16,15 @@ from pydantic import Field, StrictInt, Tag
 
 from rigidsim.errors import required
 from rigidsim.model.harmonics import TurningHarmonics
-from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.kinematics import Kinematics, along_axes
 from rigidsim.model.load import Term
-from rigidsim.model.load_words import length_text, value_text
 from rigidsim.model.loads.gravity import CentralGravity, CentralGravityFields, Placed
 from rigidsim.model.names import written
 from rigidsim.model.placements import NOWHERE, FlownAbout, PlacedOnOrbit, Placement
 from rigidsim.model.rotations import Symbolic, along
 from rigidsim.model.sources import free_flight, in_body_axes, read_in
 from rigidsim.model.two_part import as_factor, rounded
-from rigidsim.scene.arithmetic import Vector, apply, cross, diagonal, dot, norm, transpose, unit_vectors
+from rigidsim.scene.arithmetic import Vector, apply, cross, dot, norm, transpose, unit_vectors
 from rigidsim.scene.bodies.presets import EARTH
 from rigidsim.scene.earth_axes import earth_axes, rotation_rate
 from rigidsim.scene.effect_parts import EffectPart, degree_parts
@@ -50,6 +49,7 @@ from rigidsim.scene.fields import (
 )
 from rigidsim.scene.geomagnetic_field import MOST, RADIUS, igrf
 from rigidsim.scene.orbits import OrbitFields, resolve_orbit
+from rigidsim.scene.readable import length_text, value_text
 from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
@@ -520,8 +520,8 @@ class SteeredDipole(MagneticDipole):
         return super().reads | states_read(*self.law)
 
     def torque(self, m: Kinematics) -> list[Term]:
-        size = m.scene.context.ldexp(self.field.size(m.scene), -m.scaling.energy)
-        return list(zip(diagonal([size] * 3), cross(written(m, self.law), self.b(m)), strict=True))
+        pulled = cross(written(m, self.law), self.b(m))
+        return along_axes(m, self.field.size(m.scene), -m.scaling.energy, pulled)
 
     def potential(self, m: Kinematics) -> Symbolic | None:
         return None

@@ -38,9 +38,8 @@ import numpy as np
 from pydantic import Field, StrictBool
 
 from rigidsim.errors import ConfigError, Problem, required
-from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.kinematics import Kinematics, along_axes
 from rigidsim.model.load import Load, Term, loads_of
-from rigidsim.model.load_words import length_text, value_text
 from rigidsim.model.loads.applied import Applied
 from rigidsim.model.loads.gravity import Attraction
 from rigidsim.model.names import written
@@ -48,7 +47,7 @@ from rigidsim.model.plausibility import about_altitude
 from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.model.sources import RELATIVE_NAMES, flown_about, read_in
 from rigidsim.model.two_part import rounded
-from rigidsim.scene.arithmetic import Matrix, Vector, cross, diagonal, norm
+from rigidsim.scene.arithmetic import Matrix, Vector, cross, norm
 from rigidsim.scene.arithmetic import apply as multiply
 from rigidsim.scene.bodies.outside import OuterSurface, Plate
 from rigidsim.scene.bodies.presets import EARTH, known_body
@@ -71,6 +70,7 @@ from rigidsim.scene.fields import (
 )
 from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.point_masses import kepler_reach
+from rigidsim.scene.readable import length_text, value_text
 from rigidsim.scene.registry import LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
@@ -316,18 +316,17 @@ class SurfaceLoad(Load):
     def torque(self, m: Kinematics) -> list[Term]:
         """Torque place x force."""
         largest, parts = self._in_body(m, torque=True)
-        axes = diagonal([m.scene.context.ldexp(largest, -m.scaling.energy)] * 3)
-        return [(axis, x) for axis, x in zip(axes, parts, strict=True) if x is not None]
+        terms = along_axes(m, largest, -m.scaling.energy, parts)
+        return [term for term in terms if term[1] is not None]
 
     def force(self, m: Kinematics) -> list[Term]:
         """Acceleration of a freely flying body: the force over its mass."""
         if m.velocity is None or not self.pushes:
             return []
-        context = m.scene.context
         largest, parts = self._in_body(m, torque=False)
-        size = context.ldexp(largest / m.carried(m.scene.body.mass), m.scaling.time - m.scaling.speed)
         pushed = apply(m.matrix, [hy.expression(0.0) if x is None else x for x in parts])
-        return list(zip(diagonal([size] * 3), pushed, strict=True))
+        size, exponent = largest / m.carried(m.scene.body.mass), m.scaling.time - m.scaling.speed
+        return along_axes(m, size, exponent, pushed)
 
 
 def _joined(vectors: Iterable[tuple[Push, Vector]]) -> list[Sum]:
