@@ -83,6 +83,9 @@ class Mechanics(Kinematics):
     """Kinematics together with all acting loads: the quantities observables and invariants are written in."""
 
     loads: list[Load] = field(default_factory=list)
+    average: Any = (
+        None  # that replaces the full motion (``rigidsim.model.averaged.average.Average``), or None
+    )
 
     @classmethod
     def built(
@@ -128,23 +131,9 @@ class Mechanics(Kinematics):
         return replace(self, surfaces=Surfaces())._shaped()
 
     @property
-    def turning_rate(self) -> Any | None:
-        """Bound of the rate (mpf, rad/s) at which axes turn if rotations are averaged over, or None."""
-        return None
-
-    @property
-    def kept_by_average(self) -> str | None:
-        """Why averaging over rotations keeps the size of the angular momentum; None if it doesn't."""
-        return None
-
-    @property
     def commensurable_angle(self) -> tuple[Symbolic, Symbolic] | None:
         """Sine and cosine, times a common size, of the angle that an averaged resonance keeps; else None."""
         return None
-
-    def provides(self, name: str) -> bool:
-        """Whether the motion carries enough to record this observable, as far as ``needs`` doesn't decide."""
-        return True
 
     @property
     def figure_space(self) -> list[Symbolic]:
@@ -339,7 +328,7 @@ class Mechanics(Kinematics):
         energy stays, but for what drives lend that keep a rate.
         """
         kept = all(load.conservative or not (load.torque(self) or load.force(self)) for load in self.loads)
-        return kept and not self.driven_within
+        return kept and not self.driven_within and self.average is None
 
     @cached_property
     def energy(self) -> Symbolic:

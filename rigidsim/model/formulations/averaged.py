@@ -50,35 +50,12 @@ _LIGHT = 299792458  # m/s
 class AveragedMechanics(Mechanics):
     """Mechanics of an averaged motion; ``rates`` is the rate at which the momentum turns, in space axes."""
 
-    average: Average | None = None
-
-    @property
-    def of(self) -> Average:
-        """The average that is carried."""
-        return self.carried(self.average)
+    average: Average
 
     @property
     def unit(self) -> Any:
         """Internal unit of time, s (mpf)."""
         return self.scene.context.ldexp(self.scene.context.one, self.scaling.time)
-
-    @property
-    def turning_rate(self) -> Any:
-        return self.of.rate_bound
-
-    def provides(self, name: str) -> bool:
-        return self.of.provides(name)
-
-    @property
-    def kept_by_average(self) -> str | None:
-        if self.of.driven is not None or self.of.resonance is not None:
-            return None
-        return "averaged over the free rotation, a gravity gradient has no torque along the momentum"
-
-    @property
-    def conserves_energy(self) -> bool:
-        """False: the energy of the free rotation is a constant."""
-        return False
 
     # --- where the sources are ------------------------------------------------------------------------------
 
@@ -138,7 +115,7 @@ class AveragedMechanics(Mechanics):
 
     def table(self, orbit: TabulatedOrbit) -> OrbitStates:
         """Averaged over the orbit it has no direction unless the mean longitude is carried."""
-        if not self.of.over_orbits:
+        if not self.average.over_orbits:
             return super().table(orbit)
         states = self._elements[orbit]
         terms = OrbitTerms.of_elements(states, self.number)
@@ -174,14 +151,14 @@ class AveragedMechanics(Mechanics):
         """Derivatives of the states, per internal unit of time."""
         s = self.direction
         geodetic = self._geodetic()
-        if self.of.over_orbits:
-            return cross(total([self._secular(source) for source in self.of.sources] + geodetic), s)
+        if self.average.over_orbits:
+            return cross(total([self._secular(source) for source in self.average.sources] + geodetic), s)
         pull = self._pull(s)
-        if self.of.figure == 0 or not self._second:
+        if self.average.figure == 0 or not self._second:
             return cross(total([pull, *geodetic]), s)
         # the torque acts on the circled axis, which is offset from the momentum by d = -a s x s'; to second
         # order this gives (G - a G^2 + 2 a (s . G s) G) s x s for a pull G s
-        moment = self.of.motion.transverse / self.of.motion.momentum
+        moment = self.average.motion.transverse / self.average.motion.momentum
         a = as_factor(self.scaled(moment, -self.scaling.time))
         factor = 1.0 + 2.0 * (a * dot(s, pull))
         bent = [factor * g - a * again for g, again in zip(pull, self._pull(pull), strict=True)]
@@ -198,7 +175,7 @@ class AveragedMechanics(Mechanics):
         eq. 40.33).
         """
         found = []
-        for source in self.of.sources if self.scene.config.model.geodetic_precession else ():
+        for source in self.average.sources if self.scene.config.model.geodetic_precession else ():
             if source.has_elements:
                 context = self.scene.context
                 ellipse = source.ellipse(context, self.scene.start)
@@ -215,12 +192,12 @@ class AveragedMechanics(Mechanics):
         if not source.has_elements:
             return self._pull_of(source, self.direction)
         return self._terms(source).secular(
-            self.of.rate(source) * self.unit, self.direction, second=self._second
+            self.average.rate(source) * self.unit, self.direction, second=self._second
         )
 
     def _pull(self, s: list[Symbolic]) -> list[Symbolic]:
         """G s, the sum of k (a/r)^3 (s . r) r, per internal unit of time; s' is its cross product with s."""
-        return total([self._pull_of(source, s) for source in self.of.sources])
+        return total([self._pull_of(source, s) for source in self.average.sources])
 
     def _pull_of(self, source: Source, s: list[Symbolic]) -> list[Symbolic]:
         place, distance = source.of.placement.seen(self), source.of.placement.distance(self.scene.context)
@@ -230,7 +207,7 @@ class AveragedMechanics(Mechanics):
         return [factor * x for x in place.line]
 
     def _strength(self, source: Source) -> Symbolic:
-        return as_factor(self.number(self.of.rate(source) * self.unit))
+        return as_factor(self.number(self.average.rate(source) * self.unit))
 
     # --- what is recorded -----------------------------------------------------------------------------------
 
@@ -239,19 +216,19 @@ class AveragedMechanics(Mechanics):
         """Directions of momentum, figure and spin axis, of unit length to first order, space axes."""
         mean = self.direction
         lost = [hy.expression(float("nan"))] * 3
-        momentum, sign = mean, self.of.figure
-        if not self.of.short_period:
+        momentum, sign = mean, self.average.figure
+        if not self.average.short_period:
             figure = [float(sign) * x for x in mean] if sign else lost
             return mean, figure, mean
-        if self.of.over_orbits:
-            for source in self.of.sources:
+        if self.average.over_orbits:
+            for source in self.average.sources:
                 if source.has_elements:
-                    more = self._terms(source).nutation(self.of.rate(source) * self.unit, mean)
+                    more = self._terms(source).nutation(self.average.rate(source) * self.unit, mean)
                     momentum = [x + y for x, y in zip(momentum, more, strict=True)]
         if not sign:
             return momentum, lost, momentum
         # the circled axis is offset from the momentum by -a s x s', as above
-        context, motion = self.scene.context, self.of.motion
+        context, motion = self.scene.context, self.average.motion
         offset = context.ldexp(-(motion.transverse / motion.momentum), -self.scaling.time)
         factor = as_factor(self.number(offset))
         away = [factor * x for x in cross(momentum, cross(self._pull(momentum), momentum))]
@@ -262,7 +239,7 @@ class AveragedMechanics(Mechanics):
 
     @cached_property
     def momentum_size(self) -> Any:
-        return self.scaled(self.of.motion.momentum, -self.scaling.momentum)
+        return self.scaled(self.average.motion.momentum, -self.scaling.momentum)
 
     @cached_property
     def momentum_space(self) -> list[Symbolic]:
@@ -289,7 +266,7 @@ class AveragedMechanics(Mechanics):
     @cached_property
     def rotational_energy(self) -> Symbolic:
         """Energy of the free rotation, a constant."""
-        return hy.expression(self.scaled(self.of.energy, -self.scaling.energy))
+        return hy.expression(self.scaled(self.average.energy, -self.scaling.energy))
 
     # --- loads ----------------------------------------------------------------------------------------------
 
@@ -332,7 +309,7 @@ class DrivenMechanics(AveragedMechanics):
     @property
     def driven(self) -> Driven:
         """What drives the motion."""
-        return self.carried(self.of.driven)
+        return self.carried(self.average.driven)
 
     @cached_property
     def amplitudes(self) -> tuple[Symbolic, Symbolic]:
@@ -360,7 +337,7 @@ class DrivenMechanics(AveragedMechanics):
 
     @cached_property
     def derivatives(self) -> list[Symbolic]:
-        if not self.of.sources:
+        if not self.average.sources:
             return [hy.expression(0.0)] * 3
         s = self.direction
         return cross(self._pull(s), s)
@@ -413,7 +390,7 @@ class ResonantMechanics(AveragedMechanics):
     @property
     def resonance(self) -> Resonance:
         """The resonance that is kept."""
-        return self.carried(self.of.resonance)
+        return self.carried(self.average.resonance)
 
     @cached_property
     def slow_matrix(self) -> list[list[Symbolic]]:
@@ -423,7 +400,7 @@ class ResonantMechanics(AveragedMechanics):
     @cached_property
     def slow_momentum(self) -> list[Symbolic]:
         """Angular momentum along a, b, c, internal units."""
-        context, motion = self.scene.context, self.of.motion
+        context, motion = self.scene.context, self.average.motion
         whole = context.ldexp(self.resonance.pace * motion.moments[2], -self.scaling.momentum)
         first, second, excess = hy.make_vars(*SLOW[4:])
         return [first, second, excess + self.number(whole)]
@@ -474,7 +451,7 @@ class ResonantMechanics(AveragedMechanics):
         The sum over the axes leaves out b, with the middle moment taken off all of them: a sphere's part is
         constant.
         """
-        context, (least, middle, most) = self.scene.context, self.of.motion.moments
+        context, (least, middle, most) = self.scene.context, self.average.motion.moments
         ps, ts, gp, gt = dot(p, s), dot(t, s), cross(p, s), cross(t, s)
         nothing = [hy.expression(0.0)] * 3
         of_p, of_t, of_s, of_gp, of_gt = (list(nothing) for _ in range(5))
@@ -559,7 +536,7 @@ class ResonantMechanics(AveragedMechanics):
     @cached_property
     def slow_rates(self) -> list[Symbolic]:
         """Angular velocity W of the axes a, b, c, along themselves, per internal unit of time."""
-        motion = self.of.motion
+        motion = self.average.motion
         size, about, m = self.momentum_size, self.about, self.slow_momentum
         inverse = self._inverse_moments
         pace = self.scaled(self.resonance.pace, self.scaling.time)
@@ -568,7 +545,7 @@ class ResonantMechanics(AveragedMechanics):
         # w_c - p n s_c without their common part
         free.append(inverse[2] * hy.make_vars(SLOW[6]) + pace * (across / (size * (size + m[2]))))
         whole = self.scaled(motion.momentum, -self.scaling.momentum)
-        parts = [self._secular(x) for x in self.of.sources if x is not self.resonance.source]
+        parts = [self._secular(x) for x in self.average.sources if x is not self.resonance.source]
         _, bent = self._mean_torque
         driven = cross(about, [q - b for q, b in zip(self._second_torque, bent, strict=True)])
         if parts:
@@ -582,13 +559,13 @@ class ResonantMechanics(AveragedMechanics):
         context = self.scene.context
         return [
             as_factor(self.number(1 / context.ldexp(x, -self.scaling.inertia)))
-            for x in self.of.motion.moments
+            for x in self.average.motion.moments
         ]
 
     @cached_property
     def _momentum_rates(self) -> list[Symbolic]:
         """Derivative of the momentum along a, b, c, internal units."""
-        a, b, c = self.of.motion.moments
+        a, b, c = self.average.motion.moments
         context, unit, m = self.scene.context, self.scaling.inertia, self.slow_momentum
         torque, _ = self._mean_torque
         level = dot(self._second_torque, self.about)

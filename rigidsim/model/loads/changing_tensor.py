@@ -835,8 +835,8 @@ def _about_delay(delay: Any, turned: float) -> Iterator[Caution]:
     if turned > _LATE:
         yield Caution(
             WarningCode.DELAY_TOO_LONG,
-            f"{WHERE} delay: in {span_text(float(delay), 4)} body and source turn by {turned:.2g} "
-            f"rad, of which the expansion to second order leaves out some {turned**2 / 6:.1%} of what the delay does",
+            f"{WHERE} delay: in {span_text(float(delay), 4)} body and source turn by {turned:.2g} rad, of "
+            f"which the expansion to second order leaves out some {turned**2 / 6:.1%} of what the delay does",
         )
 
 

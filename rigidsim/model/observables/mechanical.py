@@ -173,11 +173,18 @@ def total_momentum_scale(m: Mechanics) -> tuple[Any, str]:
 
 
 def _torque_free(m: Mechanics) -> str | None:
-    return None if m.torque or m.turning_rate is not None else "no torque acts"
+    return None if m.torque or m.average is not None else "no torque acts"
 
 
 def _momentum_kept(m: Mechanics) -> str | None:
-    return _torque_free(m) if m.turning_rate is None else m.kept_by_average
+    if m.average is None:
+        return _torque_free(m)
+    changes = m.average.driven is not None or m.average.resonance is not None
+    return (
+        None
+        if changes
+        else "averaged over the free rotation, a gravity gradient has no torque along the momentum"
+    )
 
 
 def _conservative(m: Mechanics) -> str | None:

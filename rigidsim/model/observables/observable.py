@@ -229,7 +229,8 @@ class Observable:
 
     def available(self, m: Mechanics) -> bool:
         """Whether the scene meets all needs and nothing else makes the quantity absent."""
-        return m.provides(self.name) and self.needed(m) and self.absent(m) is None
+        carried = m.average is None or m.average.provides(self.name)
+        return carried and self.needed(m) and self.absent(m) is None
 
     def needed(self, m: Mechanics) -> bool:
         """Whether the scene has what ``needs`` names."""
