@@ -12,7 +12,7 @@ from support import config, run_text
 
 import rigidsim
 from rigidsim import ConfigError
-from rigidsim.model.earth_pole import earth_pole
+from rigidsim.model.loads.gravity import earth_pole
 from rigidsim.scene.epochs import parse_epoch
 from rigidsim.solve.problem import prepare
 

@@ -30,13 +30,19 @@ axes that turn about its pole at a constant rate, and the body as a point:
     U = -(G M m / r) sum (R/r)^n f_n(u),
     a = -(G M / r^2) sum (R/r)^n ((n + 1) f_n u + u x (u x grad f_n)).
 
+**The Earth's pole of date**, as an expression of time, is that of IAU 1976 precession with the 18.6-year term
+of nutation. Precession by Lieske's angles (Lieske et al. 1977, A&A 58, 1); nutation by the largest term of
+IAU 1980 in longitude and obliquity, with its values of J2000, in axes that have turned by zeta only: 0.02
+arcsec within a century of J2000, where all other terms are worth up to 1.5 arcsec. In axes of the ecliptic of
+J2000 it is turned by the obliquity there.
+
 **Uniform gravity** is a torque about a fixed point, or free fall of a body that moves.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import attrgetter
@@ -46,9 +52,8 @@ import heyoka as hy
 from pydantic import Field, StrictInt, StrictStr, Tag
 
 from rigidsim.errors import ConfigError, Problem, required
-from rigidsim.model.earth_pole import earth_pole
 from rigidsim.model.harmonics import Harmonics, Series, TurningHarmonics, frame_of, turning
-from rigidsim.model.kinematics import Kinematics, along_axes, inertia_times, quadratic_form
+from rigidsim.model.kinematics import Kinematics, along_axes, inertia_times, quadratic_form, seconds
 from rigidsim.model.load import Load, Term
 from rigidsim.model.orbits import Pull
 from rigidsim.model.placements import (
@@ -108,8 +113,51 @@ from rigidsim.scene.point_masses import PointMasses
 from rigidsim.scene.readable import length_text
 from rigidsim.scene.registry import LoadFields, SceneLoad, Setting, SourceFields, register_load
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.space_axes import ECLIPTIC
+from rigidsim.scene.space_axes import ECLIPTIC, obliquity, to_ecliptic
 from rigidsim.scene.swept import plain
+
+_CENTURY = 86400 * 36525  # s
+_ARCSEC = 3600 * 180
+# arcsec, in powers of centuries since J2000
+_ZETA = ("0", "2306.2181", "0.30188", "0.017998")
+_THETA = ("0", "2004.3109", "-0.42665", "-0.041833")
+_NODE = ("450160.280", "-6962890.539")
+"""Mean longitude of the Moon's ascending node."""
+_IN_LONGITUDE, _IN_OBLIQUITY, _OBLIQUITY = "-17.1996", "9.2025", "84381.448"
+
+
+def earth_pole(m: Kinematics, epoch: Epoch, axes: str) -> list[Symbolic]:
+    """Unit vector (to 1e-9) along the Earth's axis of figure, in the scene's space axes.
+
+    Args:
+        epoch: date of the scene's time 0.
+        axes: name of the space axes.
+    """
+    context = m.scene.context
+    unit = m.number(context.one / _CENTURY)
+    centuries = unit * seconds(m, since=epoch)
+
+    def arcsec(text: str) -> Any:
+        return context.mpf(text) * context.pi / _ARCSEC
+
+    def angle(coefficients: Sequence[str]) -> Symbolic:
+        numbers = [m.number(arcsec(x)) for x in coefficients]
+        total = hy.expression(numbers[-1])
+        for x in reversed(numbers[:-1]):
+            total = x + centuries * total
+        return total
+
+    zeta, theta, node = map(angle, (_ZETA, _THETA, _NODE))
+    (c1, s1), (c2, s2) = ((hy.cos(x), hy.sin(x)) for x in (zeta, theta))
+    x = m.number(arcsec(_IN_LONGITUDE) * context.sin(arcsec(_OBLIQUITY))) * hy.sin(node)
+    y = m.number(arcsec(_IN_OBLIQUITY)) * hy.cos(node)
+    along, across = c1 * x + s1 * y, c1 * y - s1 * x
+    radial = c2 * along + s2
+    equator = [c1 * radial + s1 * across, c1 * across - s1 * radial, c2 - s2 * along]
+    if axes != ECLIPTIC:
+        return equator
+    c, s = map(m.number, obliquity(context))
+    return to_ecliptic(equator, (c, s))
 
 
 def _of_placement(name: str) -> Any:
@@ -476,7 +524,6 @@ class BodyField(ByPlacedSource):
 
 
 EARTH = "iau1976"
-_CENTURY = 36525 * 86400.0
 _MOST_CENTURIES = 20
 """From J2000: the polynomials' last terms make a degree of the pole there."""
 
