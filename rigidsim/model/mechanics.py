@@ -327,8 +327,9 @@ class Mechanics(Kinematics):
         """Whether every acting load has a time-independent potential, and no carrier is driven: then the
         energy stays, but for what drives lend that keep a rate.
         """
-        kept = all(load.conservative or not (load.torque(self) or load.force(self)) for load in self.loads)
-        return kept and not self.driven_within and self.average is None
+        acting = (x for x in self.loads if not x.conservative)
+        kept = self.average is None and not any(x.torque(self) or x.force(self) for x in acting)
+        return kept and not self.driven_within
 
     @cached_property
     def energy(self) -> Symbolic:

@@ -45,8 +45,8 @@ def pace_block(m: Mechanics, before: StateBlock) -> list[StateBlock]:
     if not (watched or rooted):
         return []
     derivatives = dict(zip(before.names, before.derivatives, strict=True))
-    terms = [0.5 * (_along_the_motion(v, derivatives) / v) for _, v in rooted]
-    terms += [_along_the_motion(u, derivatives) * (u / (WIDE**2 + u * u)) for _, u in watched]
+    terms = [0.5 * (along_the_motion(v, derivatives) / v) for _, v in rooted]
+    terms += [along_the_motion(u, derivatives) * (u / (WIDE**2 + u * u)) for _, u in watched]
     titles = ", ".join(dict.fromkeys(title for title, _ in [*watched, *rooted]))
     what = " or ".join(["what is narrow"] * bool(watched) + ["a root of zero"] * bool(rooted))
     return [
@@ -73,7 +73,7 @@ def _arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:
     return found
 
 
-def _along_the_motion(u: Symbolic, derivatives: Mapping[str, Symbolic]) -> Symbolic:
+def along_the_motion(u: Symbolic, derivatives: Mapping[str, Symbolic]) -> Symbolic:
     """Time derivative of an expression, internal units; any swept number in it is constant along a motion."""
     by_time, by_state = slopes(u)
     terms = [slope * derivatives[name] for name, slope in by_state.items() if name in derivatives]

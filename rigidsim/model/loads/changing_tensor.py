@@ -64,6 +64,7 @@ from rigidsim.model.own_states import driven, own_blocks
 from rigidsim.model.rotations import Symbolic, transpose
 from rigidsim.model.rotations import apply as turned
 from rigidsim.model.scaling import Scaling, source_rate
+from rigidsim.model.step_limiter import along_the_motion
 from rigidsim.model.two_part import rounded
 from rigidsim.scene.arithmetic import Matrix, Vector, apply, cross, dot, norm, working_epsilon
 from rigidsim.scene.attitude import rotation_matrix
@@ -82,7 +83,6 @@ from rigidsim.scene.schema import Config
 from rigidsim.scene.swept import plain
 from rigidsim.scene.validation_messages import nearest
 
-_CLOCK = "t_of_moments"
 _ELEMENTS = ("moment_x", "moment_y", "moment_z")
 _SLACK, _SLACK_SINGLE = 2.0**-40, 2.0**-16
 """Part of their sum by which the moments of a flat body may break I1 + I2 >= I3, beside rounding."""
@@ -141,7 +141,7 @@ class MovedMass(Load, Carrier):
         for given in self.moments:
             if isinstance(given, Expression):
                 moments.append(unit * written(m, [given])[0])
-                changes.append(_along_motion(moments[-1], slopes))
+                changes.append(along_the_motion(moments[-1], slopes))
             else:
                 moments.append(hy.expression(m.scaled(given, -m.scaling.inertia)))
                 changes.append(0.0)
@@ -223,19 +223,6 @@ class MovedMass(Load, Carrier):
 
 def _diagonal(elements: list[Any]) -> list[list[Any]]:
     return [[elements[i] if i == j else 0.0 for j in range(3)] for i in range(3)]
-
-
-def _along_motion(expression: Symbolic, slopes: dict[str, Symbolic]) -> Symbolic:
-    """Derivative of an expression of time and states along the motion, per internal unit of time."""
-    clock = hy.make_vars(_CLOCK)
-    shown = hy.subs(expression, {hy.time: clock})
-    terms = []
-    for name in hy.get_variables(shown):
-        if name == _CLOCK:
-            terms.append(hy.diff(shown, clock))
-        elif name in slopes:  # others stand for numbers
-            terms.append(hy.diff(shown, hy.make_vars(name)) * slopes[name])
-    return hy.subs(hy.sum(terms), {clock: hy.time}) if terms else hy.expression(0.0)
 
 
 Linear = Callable[[list[Any]], list[Any]]
