@@ -125,8 +125,9 @@ def rotation_of(scene: Any) -> InitialRotation:
     return start
 
 
-def _along_massless(body: RigidBody, vector: Vector) -> bool:
+def _along_massless(body: RigidBody, vector: Vector | None) -> bool:
     """Whether a vector has a part along an axis without inertia (a rod's)."""
+    assert vector is not None
     axes = zip(body.principal_moments, body.principal_axes, strict=True)
     return any(
         moment == 0 and abs(dot(axis, vector)) > max(map(abs, vector)) * 1e-14 for moment, axis in axes

@@ -16,16 +16,17 @@ from statistics import NormalDist
 from typing import Any, Self
 
 import mpmath
+import numpy as np
 
 from rigidsim.errors import ConfigError, MemberError, Problem, Remedy, ensure
 from rigidsim.scene.choices import AUTO, FULL
-from rigidsim.scene.config import Experiment, validated
+from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber, fraction_of, parse_number
 from rigidsim.scene.paths import Path, leaves
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.schema import config_model
 from rigidsim.scene.sweep_table import INDICATORS, LARGEST_AXIS, AxisTable, SweepTable
-from rigidsim.scene.toml_text import apply_overrides, inline, parse_toml
+from rigidsim.scene.toml_text import inline, parse_toml
 from rigidsim.scene.validation_messages import nearest, shown
 
 MOST_MEMBERS = 100_000_000
@@ -189,11 +190,7 @@ class Sweep:
         """Index of each axis's value for a member; the last axis varies fastest."""
         if not self.product:
             return (member,) * len(self.axes)
-        found = []
-        for size in reversed(self.shape):
-            member, index = divmod(member, size)
-            found.append(index)
-        return tuple(reversed(found))
+        return tuple(map(int, np.unravel_index(member, self.shape)))
 
     def _pairs(self, member: int) -> Iterator[tuple[Axis, int]]:
         return zip(self.axes, self.indices(member), strict=True)
@@ -218,10 +215,12 @@ class Sweep:
         """``KEY=VALUE`` texts that turn the base experiment into the member."""
         return [f"{axis.key}={axis.text(index)}" for axis, index in self._pairs(member)]
 
-    def experiment_of(self, member: int) -> Experiment:
-        """The member as a single experiment; ConfigError names a member that a key doesn't take."""
+    def experiment_of(self, member: int, *, writes: bool = True) -> Experiment:
+        """The member as a single experiment, whose text has its values if it ``writes`` them; ConfigError
+        names a member that a key doesn't take.
+        """
         try:
-            return self.base.having(self.overrides(member))
+            return self.base.having(self.overrides(member), writes=writes)
         except ConfigError as error:
             raise self.with_member_named(member, error) from None
 
@@ -232,15 +231,11 @@ class Sweep:
         Raises:
             ConfigError: as for ``experiment_of``.
         """
-        try:
-            table = parse_toml(self.base.text, self.base.source)
-            apply_overrides(table, self.overrides(member))
-            config = validated(table, self.base.source)
-        except ConfigError as error:
-            raise self.with_member_named(member, error) from None
+        experiment = self.experiment_of(member, writes=False)
+        config = experiment.config
         if config.model.level == AUTO and config.integrator.accuracy_axis is not None:
             config = config.model_copy(update={"model": config.model.model_copy(update={"level": FULL})})
-        return replace(self.base, config=config)
+        return replace(experiment, config=config)
 
     def with_member_named(self, member: int, error: ConfigError) -> MemberError:
         """The error with the member named besides the key, unless it names the member already. Of what is

@@ -41,31 +41,34 @@ _SWEPT_TABLES = ("body", "initial", "loads", "rotors", "parameters")
 _DOUBLE = precision_of("double")
 
 
-class NotBatchable(Enum):
-    """Why a member can't run in a batch and is run by itself; the value is shown to users."""
-
-    PRECISION = "batches compute in double precision only"
-    ARITHMETIC = "heyoka on this machine has no numbers of many digits"
-    CLOSED_FORM = "the closed form takes no steps"
-    METHOD = "batches take the steps of Taylor series only"
-    EFFECT = "a registered effect acts between steps"
-    HELD = "invariants are projected between steps, which batches can't do"
-    ACCURACY = "the accuracy asked for is settled run by run"
-    CHART = "Euler angles may have to change their sequence on the way"
-    ANGLES = "full turns of recorded angles are counted along the motion"
-    SWITCHING = "the equations change along the motion"
-    MOVED_MASS = "the body changes in ways that may end its motion"
-    TABLE = "an orbit goes by a table"
-    MOMENT = "something happens so late, within so short a while, that steps need the time in two numbers"
-    ORIENTATION = "a published orientation is read with it"
-    BODIES = "point masses move with the body"
-    LYAPUNOV = "the Lyapunov spectrum has another integrator"
-    NUTATION = "wheels make it nutate so fast that coefficients take two numbers each"
-    KEY = "what is swept is not a number of the body, the start, a load, a rotor or a parameter"
-    UNTRACEABLE = "the equations depend on what is swept in a way that can't be determined beforehand"
-    FAMILIES = "too few members share a system of equations"
-    AVERAGED = "averages over the rotation are worked out for each body by itself"
-    RANGE = "a coefficient is outside the range of double precision"
+NotBatchable = Enum(
+    "NotBatchable",
+    {
+        "PRECISION": "batches compute in double precision only",
+        "ARITHMETIC": "heyoka on this machine has no numbers of many digits",
+        "CLOSED_FORM": "the closed form takes no steps",
+        "METHOD": "batches take the steps of Taylor series only",
+        "EFFECT": "a registered effect acts between steps",
+        "HELD": "invariants are projected between steps, which batches can't do",
+        "ACCURACY": "the accuracy asked for is settled run by run",
+        "CHART": "Euler angles may have to change their sequence on the way",
+        "ANGLES": "full turns of recorded angles are counted along the motion",
+        "SWITCHING": "the equations change along the motion",
+        "MOVED_MASS": "the body changes in ways that may end its motion",
+        "TABLE": "an orbit goes by a table",
+        "MOMENT": "something happens so late, within so short a while, that the time takes two numbers",
+        "ORIENTATION": "a published orientation is read with it",
+        "BODIES": "point masses move with the body",
+        "LYAPUNOV": "the Lyapunov spectrum has another integrator",
+        "NUTATION": "wheels make it nutate so fast that coefficients take two numbers each",
+        "KEY": "what is swept is not a number of the body, the start, a load, a rotor or a parameter",
+        "UNTRACEABLE": "the equations depend on what is swept in a way that can't be determined beforehand",
+        "FAMILIES": "too few members share a system of equations",
+        "AVERAGED": "averages over the rotation are worked out for each body by itself",
+        "RANGE": "a coefficient is outside the range of double precision",
+    },
+)
+"""Why a member can't run in a batch and is run by itself; the value is shown to users."""
 
 
 def batchable(experiment: Experiment, keys: Sequence[str]) -> NotBatchable | None:

@@ -42,7 +42,7 @@ def _once(name: str, find: Callable[[Scene], InitialRotation], scene: Scene) -> 
     return InitialRotation(quaternion, rates, found=found.found)
 
 
-_FINDERS = {
+_FINDERS: dict[str, Callable[[Scene], InitialRotation]] = {
     "relative": relative_equilibrium,
     **{f"cassini_{number}": partial(cassini_state, number=number) for number in (1, 2, 3, 4)},
 }

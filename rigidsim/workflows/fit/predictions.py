@@ -4,7 +4,6 @@ of them, and how that changes.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -14,12 +13,11 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.scene.choices import DEFAULT_METHOD
-from rigidsim.scene.config import Experiment, validated
+from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import parse_number
 from rigidsim.scene.fit_table import KnownWithin
 from rigidsim.scene.row_rotations import conjugated, multiplied, of_vector, vector_of
 from rigidsim.scene.scene import build_scene
-from rigidsim.scene.toml_text import apply_overrides, parse_toml
 from rigidsim.scene.units import powers, unit_text
 from rigidsim.scene.validation_messages import shown
 from rigidsim.scene.varied_keys import ATTITUDE, VariedKey, varied_keys
@@ -65,7 +63,6 @@ class FitKeys:
         table = experiment.config.fit
         assert table is not None
         self._experiment = experiment
-        self._tables = parse_toml(experiment.text, experiment.source)
         self.scene = build_scene(experiment)
         refuse_backwards(self.scene, experiment.source)
         self.estimated = self._all("parameters", table.parameters, "prior", table.prior)
@@ -144,9 +141,8 @@ class FitKeys:
 
     def experiment(self, values: Sequence[float] | np.ndarray, base: Experiment) -> Experiment:
         """An experiment at other values, without a text of its own: for runs that nobody keeps."""
-        tables = copy.deepcopy(self._tables)
-        apply_overrides(tables, self.overrides(values), "fit")
-        return replace(base, config=validated(tables, base.source))
+        varied = self._experiment.having(self.overrides(values), writes=False)
+        return replace(base, config=varied.config)
 
     def fitted(self, values: Sequence[float] | np.ndarray) -> Experiment:
         """The config with estimated values written in, and without ``[fit]``."""
