@@ -12,12 +12,12 @@ from rigidsim.look import gyrostats, signals, sources
 from rigidsim.look.fits import secular
 from rigidsim.look.plots import XYZ, Plot, by_unit, drift_plot, uncertain, variable_plot
 from rigidsim.look.record import scene_of
-from rigidsim.look.signals import clock
+from rigidsim.look.signals import clock, need, optional
 from rigidsim.look.solids import Array
 from rigidsim.scene.readable import DAY, angle_text, named_unit, scaled, turning_text
 
 Curve = Callable[[xarray.Dataset], Plot | None]
-Found = Array | tuple[Array, dict[str, Any]] | None
+Found = Array | tuple[Array, dict[str, Any]]
 """Columns (rows, n), or one (rows,), and what a dataset says of how they are drawn."""
 
 _TURN = 2 * np.pi
@@ -39,9 +39,9 @@ def recorded(
 ) -> Curve:
     """The curves of a variable as it was recorded."""
 
-    def found(dataset: xarray.Dataset) -> Plot | None:
-        if signals.values(dataset, variable) is None:
-            return None
+    @optional
+    def found(dataset: xarray.Dataset) -> Plot:
+        need(signals.values(dataset, variable) is not None)
         plot = variable_plot(dataset, dataset[variable].transpose("time", ...), "leading")
         return replace(plot, title=title, word=word, labels=labels or plot.labels, **options)
 
@@ -49,7 +49,7 @@ def recorded(
 
 
 def plotted(
-    dataset: xarray.Dataset, name: str, title: str, found: Found, *, of: str = "rad", **options: Any
+    dataset: xarray.Dataset, name: str, title: str, found: Found | None, *, of: str = "rad", **options: Any
 ) -> Plot | None:
     """A plot of what was found in a dataset, in the unit that suits it; None of nothing. An option `more` is
     what the title goes on with, and `of` the unit of what was found: empty if it isn't scaled.
@@ -67,7 +67,7 @@ def plotted(
 
 def row(name: str, title: str, find: Callable[[xarray.Dataset], Found], **options: Any) -> Curve:
     """The curves of what is found in a dataset."""
-    return lambda dataset: plotted(dataset, name, title, find(dataset), **options)
+    return lambda dataset: plotted(dataset, name, title, optional(find)(dataset), **options)
 
 
 def attitude(dataset: xarray.Dataset) -> Found:
@@ -76,17 +76,11 @@ def attitude(dataset: xarray.Dataset) -> Found:
     """
     angles, wrapped = signals.values(dataset, "euler_angles", 3), "angles_wrapped_from" in dataset.attrs
     if angles is None:
-        table, sparse = signals.in_space(dataset, np.eye(3)[2]), signals.aliased(dataset)
-        title = "Direction of the body's z axis in space" + (", samples" if sparse else "")
-        options = {
-            "name": "z_axis",
-            "title": title,
-            "word": "cosine",
-            "of": "",
-            "sparse": sparse,
-            "hues": XYZ,
-        }
-        return None if table is None else (table, {**options, "labels": ("X", "Y", "Z")})
+        sparse, words = signals.aliased(dataset), "Direction of the body's z axis in space"
+        return need(signals.in_space(dataset, np.eye(3)[2])), {
+            "name": "z_axis", "title": words + (", samples" if sparse else ""), "word": "cosine", "of": "",
+            "labels": ("X", "Y", "Z"), "hues": XYZ, "sparse": sparse,
+        }  # fmt: skip
     labels = ["φ", "θ", "ψ"]
     for k, symbol in enumerate(labels):
         if not wrapped and np.ptp(signals.finite_rows(angles)[:, k]) > 2 * _TURN:
@@ -130,8 +124,7 @@ def _of_axes(dataset: xarray.Dataset, which: int) -> Found:
     nodes, less the straight line through the first unless they swing as far about it as without it.
     """
     shown, seconds = orientations(dataset), signals.seconds(dataset)
-    if not shown:
-        return None
+    need(bool(shown))
     table = np.stack([pair[which] for pair in shown.values()], axis=1)
     options = {"labels": [f"{name} axis" for name in shown], "hues": [_AXES[name] for name in shown]}
     trend = secular(seconds, table[:, 0])
@@ -156,51 +149,49 @@ def braking(dataset: xarray.Dataset) -> Found:
         if table is not None and np.isfinite(table).all() and table[0] > 0:
             shares[words] = table / table[0]
     shares = {words: share for words, share in shares.items() if np.abs(share - 1).max() > _VISIBLE}
-    return (np.stack([*shares.values()], axis=1), {"labels": [*shares]}) if shares else None
+    need(bool(shares))
+    return np.stack([*shares.values()], axis=1), {"labels": [*shares]}
 
 
 def spin_down(dataset: xarray.Dataset) -> Found:
     """The size of an angular velocity that falls by decades."""
-    table = signals.values(dataset, "angular_velocity", 3)
-    size = np.zeros(1) if table is None else signals.norms(table)
+    size = signals.norms(need(signals.values(dataset, "angular_velocity", 3)))
     known = size[np.isfinite(size)]
-    falls = len(known) and known.min() > 0 and known[0] > 10**_DECADES * known[-1]
-    return size if falls else None
+    need(len(known) > 0 and known.min() > 0 and known[0] > 10**_DECADES * known[-1])
+    return size
 
 
-def swings(dataset: xarray.Dataset) -> tuple[Array, dict[str, Any]] | None:
+@optional
+def swings(dataset: xarray.Dataset) -> tuple[Array, dict[str, Any]]:
     """Libration angles (rows, 2), rad, less half turns so that they swing about zero, and their names."""
-    table = signals.values(dataset, "libration", 2)
-    if table is None:
-        return None
+    table = need(signals.values(dataset, "libration", 2))
     halves = np.round(np.nanmean(table, axis=0) / np.pi)
     names = zip(("in the orbit's plane", "out of it"), halves, strict=True)
-    return table - np.pi * halves, {
-        "labels": [name + (f" − {180 * k:.0f}°" if k else "") for name, k in names]
-    }
+    labels = [name + (f" − {180 * k:.0f}°" if k else "") for name, k in names]
+    return table - np.pi * halves, {"labels": labels}
 
 
-def regular(dataset: xarray.Dataset) -> tuple[Array, dict[str, Any]] | None:
+@optional
+def regular(dataset: xarray.Dataset) -> tuple[Array, dict[str, Any]]:
     """Roll, pitch and yaw where roll and yaw are defined: pitch stays away from a right angle."""
-    table = signals.values(dataset, "roll_pitch_yaw", 3)
-    return None if table is None or sources.steep(table) else (table, {"labels": ("roll", "pitch", "yaw")})
+    table = need(signals.values(dataset, "roll_pitch_yaw", 3))
+    need(not sources.steep(table))
+    return table, {"labels": ("roll", "pitch", "yaw")}
 
 
 def tilt(dataset: xarray.Dataset) -> Found:
     """Tilt of a top against the vertical."""
-    angle = signals.values(dataset, "tilt")
-    direction = signals.pole(dataset, "figure") if angle is None and signals.is_top(dataset) else None
-    if direction is None:
+    angle, title = signals.values(dataset, "tilt"), "Tilt of the figure axis against the vertical"
+    if angle is not None:
         return angle
-    title = "Tilt of the figure axis against the vertical"
+    need(signals.is_top(dataset))
+    direction = need(signals.pole(dataset, "figure"))
     return signals.angle_between(direction, scene_of(dataset).vertical), {"title": title}
 
 
 def precession(dataset: xarray.Dataset) -> Found:
     """Precession angle of a top about the vertical, less its mean motion if it goes round."""
-    angle, line = signals.values(dataset, "precession_angle"), ""
-    if angle is None:
-        return None
+    angle, line = need(signals.values(dataset, "precession_angle")), ""
     if np.nanmax(angle) - np.nanmin(angle) > _TURN:
         angle, line = grown(dataset, angle)
     return angle, {"more": line}
@@ -208,42 +199,30 @@ def precession(dataset: xarray.Dataset) -> Found:
 
 def nutation_angle(dataset: xarray.Dataset) -> Found:
     """Angle between the figure axis and the momentum."""
-    direction, along = signals.pole(dataset, "figure"), signals.pole(dataset, "momentum")
     angle = signals.values(dataset, "nutation_angle")
-    if angle is not None or direction is None or along is None:
+    if angle is not None:
         return angle
-    return signals.angle_between(direction, along)
+    return signals.angle_between(*(need(signals.pole(dataset, name)) for name in ("figure", "momentum")))
 
 
 def wobble_and_spin(dataset: xarray.Dataset) -> Found:
     """Turns of a symmetric body's figure axis about the momentum, which is fixed, and of the body about its
     figure axis, two to one of a thin plate; None where samples are too far apart to count them.
     """
-    scene, rates = scene_of(dataset), signals.values(dataset, "angular_velocity", 3)
-    pole, along = signals.pole(dataset, "figure"), signals.steady_momentum(dataset)
-    if scene.moments is None or rates is None or pole is None or along is None:
-        return None
-    a, b = np.delete(scene.moments, scene.symmetry)
-    if abs(a - b) > _ROUND * a or not np.abs(pole - along).max() > _ROUND or not signals.joined(pole):
-        return None
+    scene, rates = scene_of(dataset), need(signals.values(dataset, "angular_velocity", 3))
+    pole, along = need(signals.pole(dataset, "figure")), need(signals.steady_momentum(dataset))
+    a, b = np.delete(need(scene.moments), scene.symmetry)
+    need(abs(a - b) <= _ROUND * a and np.abs(pole - along).max() > _ROUND and signals.joined(pole))
     azimuth = np.unwrap(np.arctan2(*(pole @ way for way in signals.across(along)[::-1])))
     spin = sources.integrated(signals.seconds(dataset), rates @ scene.figure)
     turns = np.abs(np.stack([azimuth - azimuth[0], spin], axis=1)) / _TURN
     return turns, {"more": f"{turns[-1, 0] / turns[-1, 1]:.3f} turns of the wobble to one of the spin"}
 
 
-def longitude_libration(dataset: xarray.Dataset) -> Found:
-    """The physical libration in longitude."""
-    found = sources.librations(dataset)
-    return None if found is None else found[0]
-
-
 def latitude_libration(dataset: xarray.Dataset) -> Found:
     """The physical librations of the figure axis."""
-    found = sources.librations(dataset)
-    if found is None or found[1] is None:
-        return None
-    return found[1], {"window": _WINDOW * loop_rows(found[1][:, 0])}
+    found = need(need(sources.librations(dataset))[1])
+    return found, {"window": _WINDOW * loop_rows(found[:, 0])}
 
 
 def loop_rows(swing: Array) -> int:
@@ -255,79 +234,64 @@ def loop_rows(swing: Array) -> int:
 
 def pointing(dataset: xarray.Dataset) -> Found:
     """How far a body axis points away from where the air or the light comes from."""
-    found = sources.pointing_angle(dataset)
-    if found is None:
-        return None
-    axis, towards, angle = found
+    axis, towards, angle = need(sources.pointing_angle(dataset))
     part = -(-len(angle) // 10)  # whose means differ less than single values of what swings
     falls = bool(np.nanmean(angle[:part]) > 10**_DECADES * np.nanmean(angle[-part:]))
     return angle, {"more": f"{axis} axis and {towards}", "log": falls, "from_zero": not falls}
 
 
-def locked_longitude(dataset: xarray.Dataset) -> Array | None:
+@optional
+def locked_longitude(dataset: xarray.Dataset) -> Array:
     """Longitude (rows,), rad, turns counted, under a source that a body faces in the end alone."""
-    found, rates = sources.seen(dataset), signals.values(dataset, "angular_velocity", 3)
-    if found is None or rates is None or not np.isfinite(found.directions).all():
-        return None
-    if found.stays() or not found.stays(found.last):
-        return None
+    found = need(sources.seen(dataset))
+    need("angular_velocity" in dataset and np.isfinite(found.directions).all())
+    need(found.stays(found.last) and not found.stays())
     longitude = found.coordinates(scene_of(dataset).figure)[:, 0]
     whole = _TURN * np.round(np.mean(longitude[found.last]) / _TURN)
-    return longitude - whole if np.abs(np.diff(longitude)).max() < 3 else None
-
-
-def locking(dataset: xarray.Dataset) -> Found:
-    """Turns of the body before its source, until it keeps one face to it."""
-    longitude = locked_longitude(dataset)
-    return None if longitude is None else longitude / _TURN
+    need(np.abs(np.diff(longitude)).max() < 3)
+    return longitude - whole
 
 
 def _of_rotors(dataset: xarray.Dataset, columns: list[Array]) -> Found:
     """A column for each rotor; what motors do takes the whole run."""
     rotors = gyrostats.rotors(dataset)
     options = {"labels": [r.name for r in rotors], "begins": all(r.drive != "driven" for r in rotors)}
-    return (np.stack(columns, axis=1), options) if columns else None
+    need(bool(columns))
+    return np.stack(columns, axis=1), options
 
 
 def rotor_tilts(dataset: xarray.Dataset) -> Found:
     """Angles of the rotors' axes from the angular momentum."""
-    whole, rotors = gyrostats.momentum(dataset), gyrostats.rotors(dataset)
-    return _of_rotors(
-        dataset, [] if whole is None else [signals.angle_between(whole, r.axis) for r in rotors]
-    )
+    whole, rotors = need(gyrostats.momentum(dataset)), gyrostats.rotors(dataset)
+    return _of_rotors(dataset, [signals.angle_between(whole, rotor.axis) for rotor in rotors])
 
 
 def rotor_rates(dataset: xarray.Dataset) -> Found:
     """Rates of the rotors relative to the body, if one changes."""
     rotors = gyrostats.rotors(dataset)
-    return _of_rotors(dataset, [r.rate for r in rotors] if any(r.varies for r in rotors) else [])
+    need(any(rotor.varies for rotor in rotors))
+    return _of_rotors(dataset, [rotor.rate for rotor in rotors])
 
 
-def _core(dataset: xarray.Dataset) -> tuple[Array, Array] | None:
+def _core(dataset: xarray.Dataset) -> list[Array]:
     """Rates (rows, 3) of a fluid core and of the mantle, body axes."""
-    core, mantle = (signals.values(dataset, f"{part}angular_velocity", 3) for part in ("core_", ""))
-    return None if core is None or mantle is None else (core, mantle)
+    return [need(signals.values(dataset, f"{part}angular_velocity", 3)) for part in ("core_", "")]
 
 
 def core_axis(dataset: xarray.Dataset) -> Found:
     """Angle between the axes about which core and mantle turn."""
-    found = _core(dataset)
-    if found is None:
-        return None
-    apart = signals.angle_between(*found)
+    apart = signals.angle_between(*_core(dataset))
     return apart, {"from_zero": bool(np.nanmin(apart) > (1 - _VISIBLE) * np.nanmax(apart))}
 
 
 def core_slip(dataset: xarray.Dataset) -> Found:
     """By how much faster the core turns than the mantle, rad/s; None if that is only rounding."""
-    found = _core(dataset)
-    if found is None:
-        return None
-    core, mantle = found
+    core, mantle = _core(dataset)
     both = signals.norms(core) + signals.norms(mantle)
     # of vectors nearly alike: less is lost than by taking the difference of their norms
     difference = np.einsum("ti,ti->t", core - mantle, core + mantle)
-    return difference / both if (np.abs(difference) > _ROUNDING * both**2).any() else None
+    need((np.abs(difference) > _ROUNDING * both**2).any())
+    return difference / both
 
 
 def own_states(place: int) -> Curve:
@@ -336,8 +300,7 @@ def own_states(place: int) -> Curve:
     def found(dataset: xarray.Dataset) -> Found:
         own = [v for v in dataset.data_vars.values() if v.attrs.get("given_by") == "[[states]]"]
         groups = [*by_unit(own).items()]
-        if place >= len(groups):
-            return None
+        need(place < len(groups))
         unit, columns = groups[place]
         title = "User-defined states" if len(columns) > 1 else f"User-defined state {next(iter(columns))}"
         return np.stack([*columns.values()], axis=1), {"title": title, "labels": [*columns], "of": unit}
@@ -347,27 +310,23 @@ def own_states(place: int) -> Curve:
 
 def published(dataset: xarray.Dataset) -> Found:
     """Angles from a published orientation to the attitude, and between the poles."""
-    angle, pole = (signals.values(dataset, f"published_{name}") for name in ("angle", "pole_angle"))
-    if angle is None or pole is None:
-        return None
+    found = [need(signals.values(dataset, f"published_{name}")).ravel() for name in ("angle", "pole_angle")]
     kernel = dataset["published_angle"].attrs.get("kernel", "a kernel")
-    return np.column_stack([angle.ravel(), pole.ravel()]), {"more": f" ({kernel})"}
+    return np.column_stack(found), {"more": f" ({kernel})"}
 
 
 def published_rotation(dataset: xarray.Dataset) -> Found:
     """The rotation vector between them, less its mean, which is an offset of the body's axes."""
-    table = signals.values(dataset, "published_rotation", 3)
-    return None if table is None else table - table.mean(axis=0)
+    table = need(signals.values(dataset, "published_rotation", 3))
+    return table - table.mean(axis=0)
 
 
 def sensitivity(variable: str, moved: str) -> Curve:
     """Sizes of derivatives by each parameter, for one SI unit of it."""
 
     def found(dataset: xarray.Dataset) -> Found:
-        table = signals.values(dataset, variable)
-        if table is None:
-            return None
-        attributes, size, labels = dataset[variable].attrs, np.linalg.norm(table, axis=2), []
+        size, labels = np.linalg.norm(need(signals.values(dataset, variable)), axis=2), []
+        attributes = dataset[variable].attrs
         units = str(attributes.get("parameter_units", "")).split(", ")
         for k, key in enumerate(map(str, dataset["parameter"].values)):
             unit = units[k] if k < len(units) else ""
@@ -395,15 +354,17 @@ CURVES: dict[str, Curve] = {
         "spin", "Size of the angular velocity", spin_down, of="rad/s", word="|ω|", log=True, begins=True
     ),
     "polar_motion": row(
-        "polar_motion", "Polar motion: the spin axis seen from the figure axis", signals.polar_motion,
+        "polar_motion", "Polar motion: the spin axis seen from the figure axis",
+        lambda dataset: need(signals.polar_motion(dataset)),
         labels=("m₁", "m₂"), word="polar motion", begins=True,
     ),
     "libration": row(
-        "libration", "Libration: the long axis from the direction to the source", swings, word="libration",
-        begins=True,
+        "libration", "Libration: the long axis from the direction to the source",
+        lambda dataset: need(swings(dataset)), word="libration", begins=True,
     ),
     "roll_pitch_yaw": row(
-        "roll_pitch_yaw", "Attitude against the local frame of the orbit", regular, begins=True
+        "roll_pitch_yaw", "Attitude against the local frame of the orbit",
+        lambda dataset: need(regular(dataset)), begins=True,
     ),
     "tilt": row("tilt", "Tilt against the vertical", tilt, word="θ", begins=True),
     "precession": row("precession_angle", "Precession", precession, hues=("orange",), word="φ", begins=True),
@@ -415,8 +376,8 @@ CURVES: dict[str, Curve] = {
         labels=("wobble: the axis about the momentum", "spin: the body about its axis"),
     ),
     "longitude_libration": row(
-        "longitude_libration", "Physical libration in longitude, less the mean rotation", longitude_libration,
-        word="longitude",
+        "longitude_libration", "Physical libration in longitude, less the mean rotation",
+        lambda dataset: need(sources.librations(dataset))[0], word="longitude",
     ),
     "latitude_libration": row(
         "latitude_libration", "Physical librations in latitude", latitude_libration,
@@ -425,8 +386,8 @@ CURVES: dict[str, Curve] = {
     ),
     "pointing": row("pointing", "Angle between the body's ", pointing, begins=True),
     "locking": row(
-        "locking", "The point under the source, until the rotation is locked", locking, of="", unit="turns",
-        word="longitude",
+        "locking", "The point under the source, until the rotation is locked",
+        lambda dataset: need(locked_longitude(dataset)) / _TURN, of="", unit="turns", word="longitude",
     ),
     "rotor_tilts": row("rotor_tilts", "Axes of the rotors, from the angular momentum", rotor_tilts),
     "rotor_rates": row(

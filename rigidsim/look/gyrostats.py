@@ -18,6 +18,7 @@ import xarray
 
 from rigidsim.look import signals
 from rigidsim.look.record import scene_of
+from rigidsim.look.signals import need, optional
 from rigidsim.look.solids import Array
 
 _STEADY = 1e-5  # of its size, within which the momentum's is constant: more than rounding in single precision
@@ -72,21 +73,22 @@ def tensor(dataset: xarray.Dataset) -> Array | None:
     return None if "principal_moments" in dataset else scene_of(dataset).inertia
 
 
-def momentum(dataset: xarray.Dataset) -> Array | None:
+@optional
+def momentum(dataset: xarray.Dataset) -> Array:
     """Angular momentum (rows, 3) of the body and all its rotors, body axes, kg m^2/s."""
-    inertia, rates, found = tensor(dataset), signals.values(dataset, "angular_velocity"), rotors(dataset)
-    unknown = len(found) < len(scene_of(dataset).rotors) or scene_of(dataset).core
-    if inertia is None or rates is None or unknown:
-        return None
-    return np.asarray(signals.turned(rates, inertia) + sum(rotor.inner for rotor in found))
+    found, scene = rotors(dataset), scene_of(dataset)
+    need(len(found) == len(scene.rotors) and not scene.core)
+    body = signals.turned(need(signals.values(dataset, "angular_velocity")), need(tensor(dataset)))
+    return np.asarray(body + sum(rotor.inner for rotor in found))
 
 
-def path(dataset: xarray.Dataset) -> Array | None:
+@optional
+def path(dataset: xarray.Dataset) -> Array:
     """The same, if it keeps to a sphere; else None."""
-    found = momentum(dataset)
-    sizes = signals.norms(signals.finite_rows(found)) if found is not None else np.zeros(0)
-    steady = len(sizes) and sizes.min() > 0 and sizes.max() <= (1 + _STEADY) * sizes.min()
-    return found if steady else None
+    found = need(momentum(dataset))
+    sizes = signals.norms(signals.finite_rows(found))
+    need(len(sizes) > 0 and sizes.min() > 0 and sizes.max() <= (1 + _STEADY) * sizes.min())
+    return found
 
 
 @dataclass(frozen=True)
@@ -113,11 +115,11 @@ class Gyrostat:
     size: float
 
     @classmethod
-    def of(cls, dataset: xarray.Dataset, row: int) -> Self | None:
+    @optional
+    def of(cls, dataset: xarray.Dataset, row: int) -> Self:
         """The gyrostat of a finite row, as if motors stopped; None if the momentum's size changes."""
-        whole, inertia, rates = path(dataset), tensor(dataset), signals.values(dataset, "angular_velocity")
-        if whole is None or inertia is None or rates is None:
-            return None
+        whole, inertia = need(path(dataset)), need(tensor(dataset))
+        rates = need(signals.values(dataset, "angular_velocity"))
         row = np.flatnonzero(np.isfinite(whole).all(axis=1))[row]
         turning, inner = inertia.copy(), np.zeros(3)
         for rotor in rotors(dataset):

@@ -10,6 +10,7 @@ import xarray
 from rigidsim.look import fits, signals, sources
 from rigidsim.look.curves import precesses
 from rigidsim.look.record import scene_of
+from rigidsim.look.signals import need, optional
 from rigidsim.look.solids import Array
 from rigidsim.look.states import events_of
 from rigidsim.scene.readable import angle_text, period_text, scaled, span_text, with_unit
@@ -82,11 +83,10 @@ def once_round(dataset: xarray.Dataset, plane: Array) -> str:
     return f": once round in {fits.turn_text(mean, dataset.attrs)}, {way}"
 
 
-def polar_motion(dataset: xarray.Dataset) -> Path | None:
+def polar_motion(dataset: xarray.Dataset) -> Path:
     """The spin axis seen from the figure axis, m1 to the right and m2 up, and its period."""
-    plane = signals.polar_motion(dataset) if signals.near_axis(dataset) else None
-    if plane is None:
-        return None
+    need(signals.near_axis(dataset))
+    plane = need(signals.polar_motion(dataset))
     sparse, radius = signals.wobble_aliased(dataset), signals.norms(plane)
     least, most = float(np.nanmin(radius)), float(np.nanmax(radius))
     reach = f"{angle_text(least, like=most)} to " if most - least > 1e-3 * most else ""
@@ -95,7 +95,7 @@ def polar_motion(dataset: xarray.Dataset) -> Path | None:
     return planar("polar_motion", title, plane, "m₁", "m₂", hue="pink", center="figure axis", sparse=sparse)
 
 
-def pole_path(dataset: xarray.Dataset) -> Path | None:
+def pole_path(dataset: xarray.Dataset) -> Path:
     """Path of the figure axis in space, seen from outside along the pole that it circles: of a free body the
     momentum, else the reference plane's. Distances from the centre are angles.
     """
@@ -113,8 +113,7 @@ def pole_path(dataset: xarray.Dataset) -> Path | None:
             if pair is not None
         }
         title, names, center = "the pole", ("along X", "along Y"), "reference pole"
-    if not paths:
-        return None
+    need(bool(paths))
     shown = next(iter(paths.values()))
     reach = max(float(np.nanmax(np.abs(shown - np.nanmean(shown, axis=0)))), 1e-300)
     others = {f"{n} axis": p for n, p in paths.items() if not np.nanmax(np.abs(p - shown)) < _SAME * reach}
@@ -133,18 +132,16 @@ def flat(directions: Array) -> Array:
     return plane * np.divide(angle, size, out=np.ones_like(size), where=size > 1e-12)[:, None]
 
 
-def nutation(dataset: xarray.Dataset) -> Path | None:
+def nutation(dataset: xarray.Dataset) -> Path:
     """A precessing figure axis, else the momentum, less its mean motion, if that stays small, and its
     strongest part: longitude of the node, times sin of the mean obliquity, across, and obliquity up.
     """
-    found = signals.orientation(dataset, "figure") or signals.orientation(dataset, "momentum")
-    if found is None or not precesses(dataset):
-        return None
-    (tilt, node), seconds = found, signals.seconds(dataset)
+    tilt, node = need(signals.orientation(dataset, "figure") or signals.orientation(dataset, "momentum"))
+    seconds = signals.seconds(dataset)
+    need(precesses(dataset))
     mean = fits.secular(seconds, tilt).value
     path = np.stack([(node - fits.secular(seconds, node).at(seconds)) * np.sin(mean), tilt - mean], axis=1)
-    if not 0 < np.nanmax(signals.norms(path)) < _FAR:
-        return None
+    need(0 < np.nanmax(signals.norms(path)) < _FAR)
     ellipse, drawn = fits.leading_ellipse(seconds, node, tilt, float(np.sin(mean))), None
     if ellipse is not None:
         long, short = (angle_text(size, 3) for size in ellipse.semi_axes)
@@ -154,13 +151,12 @@ def nutation(dataset: xarray.Dataset) -> Path | None:
     return planar("nutation", title, path, *labels, ellipse=drawn)
 
 
-def tip(dataset: xarray.Dataset) -> Path | None:
+def tip(dataset: xarray.Dataset) -> Path:
     """A top's tip, recorded or the end of the unit figure axis, seen from above."""
     up, points, what, unit = scene_of(dataset).vertical, signals.values(dataset, "tip", 3), "Tip", "m"
     if points is None:
-        points, what, unit = signals.pole(dataset, "figure"), "Figure axis", ""
-    if points is None or not signals.is_top(dataset):
-        return None
+        points, what, unit = need(signals.pole(dataset, "figure")), "Figure axis", ""
+    need(signals.is_top(dataset))
     plane = points @ _in_plane(up)
     if not unit and np.nanmax(np.abs(plane)) < _SMALL:  # components of a unit vector are angles
         unit = "rad"
@@ -168,11 +164,9 @@ def tip(dataset: xarray.Dataset) -> Path | None:
     return planar("tip", f"{what}, seen from above", plane, *names, of=unit, center="vertical")
 
 
-def nadir(dataset: xarray.Dataset) -> Path | None:
+def nadir(dataset: xarray.Dataset) -> Path:
     """Direction of the source in body axes, about the axis that it is near to."""
-    directions = sources.toward(dataset)
-    if directions is None:
-        return None
+    directions = need(sources.toward(dataset))
     mean = np.nanmean(directions, axis=0)
     k, names = int(np.abs(mean).argmax()), "xyz"
     sign, facing = ("", 1.0) if mean[k] > 0 else ("−", -1.0)
@@ -182,11 +176,10 @@ def nadir(dataset: xarray.Dataset) -> Path | None:
     return planar("nadir", "The source seen from the body", plane, across, up, center=center)
 
 
-def sub_source(dataset: xarray.Dataset) -> Path | None:
+def sub_source(dataset: xarray.Dataset) -> Path:
     """The point under a source that a body always faces, from longitude and latitude zero."""
-    found = sources.seen(dataset)
-    if found is None or not np.isfinite(found.directions).all() or not found.stays():
-        return None
+    found = need(sources.seen(dataset))
+    need(np.isfinite(found.directions).all() and found.stays())
     title, plane = (
         f"Sub-{found.body.name if found.body else 'source'} point",
         found.coordinates(scene_of(dataset).figure),
@@ -194,28 +187,24 @@ def sub_source(dataset: xarray.Dataset) -> Path | None:
     return planar("sub_source", title, plane, "longitude", "latitude", hue="orange", center="zero")
 
 
-def herpolhode(dataset: xarray.Dataset) -> Path | None:
+def herpolhode(dataset: xarray.Dataset) -> Path:
     """The tip of the angular velocity on the invariable plane, seen along the momentum."""
     plane, title = herpolhode_plane(dataset), "Herpolhode on the invariable plane"
-    if plane is None:
-        return None
     return planar("herpolhode", title, plane, "across L", "across L", of="rad/s", center="L")
 
 
-def herpolhode_plane(dataset: xarray.Dataset) -> Array | None:
-    """Component of the angular velocity across the momentum (rows, 2), rad/s; None if the momentum moves."""
-    along, rates = signals.steady_momentum(dataset), signals.values(dataset, "angular_velocity", 3)
-    turning = None if rates is None or along is None else signals.in_space(dataset, rates)
-    return None if turning is None or along is None else turning @ np.stack(signals.across(along), axis=1)
+def herpolhode_plane(dataset: xarray.Dataset) -> Array:
+    """Component of the angular velocity across the momentum (rows, 2), rad/s."""
+    along, rates = need(signals.steady_momentum(dataset)), signals.values(dataset, "angular_velocity", 3)
+    return need(signals.in_space(dataset, need(rates))) @ np.stack(signals.across(along), axis=1)
 
 
-def flight(dataset: xarray.Dataset) -> Path | None:
+@optional
+def flight(dataset: xarray.Dataset) -> Path:
     """The path of the centre of mass: of a body thrown seen from the side, else in its plane; None if it lies
     in none.
     """
-    position, scene = signals.values(dataset, "position", 3), scene_of(dataset)
-    if position is None:
-        return None
+    position, scene = need(signals.values(dataset, "position", 3)), scene_of(dataset)
     (scale, unit), up = scaled(position - position[0], "m"), scene.vertical
     if scene.gravity is not None and not scene.attractors:
         level = position - np.outer(position @ up, up)
@@ -228,8 +217,7 @@ def flight(dataset: xarray.Dataset) -> Path | None:
         return Path("path", title, points / scale, *names, unit, alike=high < _ELONGATED * low)
     finite = signals.finite_rows(position)
     _, spread, ways = np.linalg.svd(finite - finite.mean(axis=0), full_matrices=False)
-    if len(spread) < 3 or spread[1] == 0 or spread[2] > _FLAT * spread[0]:
-        return None
+    need(len(spread) == 3 and spread[1] > 0 and spread[2] <= _FLAT * spread[0])
     normal = ways[2] * np.sign(ways[2, np.abs(ways[2]).argmax()])
     points, size = position @ _in_plane(normal), float(np.linalg.norm(np.ptp(position, axis=0)))
     near = any(not any(one["position"]) for one in scene.attractors)
@@ -247,7 +235,8 @@ def _in_plane(normal: Array) -> Array:
 
 
 PATHS: dict[str, Find] = {
-    find.__name__: find for find in (polar_motion, pole_path, nutation, tip, nadir, sub_source, herpolhode)
+    find.__name__: optional(find)
+    for find in (polar_motion, pole_path, nutation, tip, nadir, sub_source, herpolhode)
 }
 """All of them by name."""
 

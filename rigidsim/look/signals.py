@@ -1,11 +1,13 @@
 """Quantities of a dataset in memory: recorded ones by name, others from attitude and rates.
 
-All are float64 arrays over its rows, or None if they can't be derived.
+All are float64 arrays over its rows, or None if they can't be derived. Within a function that is `optional`,
+`need` asks for others: where they are absent, it gives None.
 """
 
 import re
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 import xarray
@@ -16,6 +18,7 @@ from rigidsim.scene.epochs import J2000
 from rigidsim.scene.readable import YEAR, TimeUnit, epoch_of, julian_year, unit_of
 from rigidsim.scene.space_axes import CELESTIAL, EQUATOR, obliquity, to_equator
 
+P, T = ParamSpec("P"), TypeVar("T")
 _ORBIT_NORM = re.compile(r"orbit_norm_(\d+)")
 _IN_WORDS = {"energy_balance": "energy less work"}
 _AVERAGED = ("spin_averaged", "orbit_averaged")  # model levels whose datasets have axes but no attitude
@@ -28,6 +31,30 @@ _DEFINING = {
 _SOME_MINUTES = 300.0  # s, up to which a clock counts seconds
 _STEADY = 1e-6  # a momentum that turns by less is fixed
 _SPREAD = 1e-5  # of the energy, up to which it counts as constant: more than rounding in single precision
+
+
+class Absent(Exception):
+    """A dataset hasn't what a part of a picture needs."""
+
+
+def need(value: T | None) -> T:
+    """A value, or a condition, that a part of a picture needs; ``Absent`` if it is None, or false."""
+    if value is None or (isinstance(value, bool | np.bool_) and not value):
+        raise Absent
+    return value
+
+
+def optional(find: Callable[P, T]) -> Callable[P, T | None]:
+    """A function that is None where something that it needs is absent."""
+
+    @wraps(find)
+    def found(*args: P.args, **options: P.kwargs) -> T | None:
+        try:
+            return find(*args, **options)
+        except Absent:
+            return None
+
+    return found
 
 
 def title_of(dataset: xarray.Dataset) -> str:
@@ -74,20 +101,21 @@ def clock(dataset: xarray.Dataset) -> tuple[Array, TimeUnit, str]:
     return time, unit, f"time since {'J2000' if epoch == J2000 else epoch} [{unit.symbol}]"
 
 
-def principal_rates(dataset: xarray.Dataset) -> Array | None:
+@optional
+def principal_rates(dataset: xarray.Dataset) -> Array:
     """Angular velocity (rows, 3) along the principal axes, rad/s."""
-    rates = values(dataset, "angular_velocity", 3)
-    return None if rates is None else turned(rates, scene_of(dataset).axes)
+    return turned(need(values(dataset, "angular_velocity", 3)), scene_of(dataset).axes)
 
 
-def path_of_rates(dataset: xarray.Dataset) -> Array | None:
+@optional
+def path_of_rates(dataset: xarray.Dataset) -> Array:
     """The same, if rows are dense enough for its path: a mean step, weighted by steps' lengths, is short."""
-    rates = principal_rates(dataset)
-    table = np.zeros((0, 3)) if rates is None else finite_rows(rates)
-    if len(table) < 3 or energy_and_momentum(dataset) is not None:
-        return rates
-    steps, radius = norms(np.diff(table, axis=0)), float(norms(table - table.mean(axis=0)).max())
-    return rates if steps @ steps <= _JOINED * radius * steps.sum() else None
+    rates = need(principal_rates(dataset))
+    table = finite_rows(rates)
+    if len(table) > 2 and energy_and_momentum(dataset) is None:
+        steps, radius = norms(np.diff(table, axis=0)), float(norms(table - table.mean(axis=0)).max())
+        need(steps @ steps <= _JOINED * radius * steps.sum())
+    return rates
 
 
 def turned(vectors: Array, matrix: Array) -> Array:
@@ -148,7 +176,8 @@ def axis_names(dataset: xarray.Dataset) -> list[str]:
     return ["xyz"[k] for k in axes.argmax(axis=1)] if along.all() else ["1", "2", "3"]
 
 
-def polar_motion(dataset: xarray.Dataset) -> Array | None:
+@optional
+def polar_motion(dataset: xarray.Dataset) -> Array:
     """m1, m2 (rows, 2), rad: the spin axis seen from the figure axis; None if it departs too far from that.
 
     Recorded, or else the rates across the principal axis about which the body spins, over that along it.
@@ -156,13 +185,11 @@ def polar_motion(dataset: xarray.Dataset) -> Array | None:
     recorded = values(dataset, "polar_motion", 2)
     if recorded is not None and np.isfinite(recorded).any():
         return recorded
-    rates = principal_rates(dataset)
-    if rates is None or scene_of(dataset).moments is None or not np.isfinite(rates).all(axis=1).any():
-        return None
+    rates = need(principal_rates(dataset))
     finite = finite_rows(rates)
+    need(scene_of(dataset).moments is not None and len(finite) > 0)
     k = int(np.abs(finite).mean(axis=0).argmax())
-    if not (np.abs(finite[:, k]) > 0).all() or np.ptp(np.sign(finite[:, k])):
-        return None
+    need(not finite[:, k].min() <= 0 <= finite[:, k].max())
     return rates[:, [(k + 1) % 3, (k + 2) % 3]] / rates[:, [k]]
 
 
@@ -173,53 +200,48 @@ def near_axis(dataset: xarray.Dataset, *, exactly: bool = False) -> bool:
     return largest < NEAR_AXIS and (exactly or largest > 0)
 
 
-def energy_and_momentum(dataset: xarray.Dataset) -> tuple[Array, float, float] | None:
+@optional
+def energy_and_momentum(dataset: xarray.Dataset) -> tuple[Array, float, float]:
     """Moments, twice the energy and the squared momentum of a free body; None where these aren't constant."""
-    scene, rates = scene_of(dataset), principal_rates(dataset)
-    if scene.moments is None or rates is None or scene.carries_within:
-        return None
-    rates = finite_rows(rates)
-    twice, square = rates**2 @ scene.moments, rates**2 @ scene.moments**2
-    for table in (twice, square):
-        # loads, or axes that aren't the principal ones, change them
-        if not len(table) or table.min() <= 0 or table.max() > (1 + _SPREAD) * table.min():
-            return None
-    return scene.moments, float(twice.mean()), float(square.mean())
+    moments, rates = need(scene_of(dataset).moments), finite_rows(need(principal_rates(dataset)))
+    need(len(rates) > 0 and not scene_of(dataset).carries_within)
+    twice, square = rates**2 @ moments, rates**2 @ moments**2
+    for table in (twice, square):  # loads, or axes that aren't the principal ones, change them
+        need(table.min() > 0 and table.max() <= (1 + _SPREAD) * table.min())
+    return moments, float(twice.mean()), float(square.mean())
 
 
-def in_space(dataset: xarray.Dataset, vectors: Array) -> Array | None:
+@optional
+def in_space(dataset: xarray.Dataset, vectors: Array) -> Array:
     """Vectors of the body, (3,) or along time (rows, 3), in space axes (rows, 3); None without attitude."""
-    quaternion = values(dataset, "quaternion", 4)
-    if quaternion is None:
-        return None
-    return np.einsum(
-        "tij,tj->ti", rotation_matrix(quaternion), np.broadcast_to(vectors, (len(quaternion), 3))
-    )
+    turns = rotation_matrix(need(values(dataset, "quaternion", 4)))
+    return np.asarray(np.einsum("tij,tj->ti", turns, np.broadcast_to(vectors, (len(turns), 3))))
 
 
-def pole(dataset: xarray.Dataset, axis: str) -> Array | None:
+@optional
+def pole(dataset: xarray.Dataset, axis: str) -> Array:
     """Unit vectors (rows, 3), space axes, of the axis named figure, spin, momentum or core (its rate's)."""
     recorded = values(dataset, f"{axis}_axis", 3)
     if recorded is not None:
         return recorded
     if axis == "figure":
-        return in_space(dataset, scene_of(dataset).figure)
-    found = values(dataset, _DEFINING[axis], 3)
-    found = found if found is None or axis == "momentum" else in_space(dataset, found)
+        return need(in_space(dataset, scene_of(dataset).figure))
+    found = need(values(dataset, _DEFINING[axis], 3))
+    found = found if axis == "momentum" else need(in_space(dataset, found))
     with np.errstate(invalid="ignore"):  # a body at rest has no such axis
-        return None if found is None else found / norms(found)[:, None]
+        return found / norms(found)[:, None]
 
 
-def steady_momentum(dataset: xarray.Dataset) -> Array | None:
+@optional
+def steady_momentum(dataset: xarray.Dataset) -> Array:
     """Direction (3,) of the momentum if it is fixed in space; else None."""
-    directions = pole(dataset, "momentum")
-    directions = np.zeros((0, 3)) if directions is None else finite_rows(directions)
-    if not len(directions) or norms(directions - directions[0]).max() > _STEADY:
-        return None
+    directions = finite_rows(need(pole(dataset, "momentum")))
+    need(len(directions) > 0 and norms(directions - directions[0]).max() <= _STEADY)
     return np.asarray(directions.mean(axis=0) / np.linalg.norm(directions.mean(axis=0)))
 
 
-def reference_axes(dataset: xarray.Dataset) -> tuple[Array, str] | None:
+@optional
+def reference_axes(dataset: xarray.Dataset) -> tuple[Array, str]:
     """X', Y' and normal (3, 3), as rows, of the plane from which obliquities and longitudes count, and what
     it is called; None for one that moves.
 
@@ -227,8 +249,7 @@ def reference_axes(dataset: xarray.Dataset) -> tuple[Array, str] | None:
     the Earth's equator, the ecliptic.
     """
     scene = scene_of(dataset)
-    if scene.reference == "moving":
-        return None
+    need(scene.reference != "moving")
     ecliptic = np.array(to_equator([0.0, 0.0, 1.0], obliquity(np)))
     equatorial = scene.space_axes in (*CELESTIAL, EQUATOR)
     normal = ecliptic if equatorial and "obliquity" not in dataset else np.eye(3)[2]
@@ -243,7 +264,8 @@ def reference_axes(dataset: xarray.Dataset) -> tuple[Array, str] | None:
     return np.stack([first, np.cross(normal, first), normal]), "ecliptic" if seen_as else "plane of reference"
 
 
-def orientation(dataset: xarray.Dataset, axis: str) -> tuple[Array, Array] | None:
+@optional
+def orientation(dataset: xarray.Dataset, axis: str) -> tuple[Array, Array]:
     """Obliquity and node longitude (rows,) each, rad, of the axis named figure, spin or momentum.
 
     As recorded; otherwise against the plane of `reference_axes`, or XY of space where that moves, with a
@@ -251,14 +273,10 @@ def orientation(dataset: xarray.Dataset, axis: str) -> tuple[Array, Array] | Non
     """
     tilt, node = (values(dataset, name) for name in ("obliquity", "node_longitude"))
     if tilt is not None and node is not None and "axis" in dataset["obliquity"].coords:
-        names = [str(label) for label in dataset["obliquity"].coords["axis"].values]
-        if axis not in names:
-            return None
-        found = tilt[:, names.index(axis)], node[:, names.index(axis)]
-        return found if np.isfinite(found[0]).any() else None  # an average over a tumbling has no figure axis
-    directions, plane = pole(dataset, axis), reference_axes(dataset)
-    if directions is None:
-        return None
+        which = dataset["obliquity"].coords["axis"].values == axis
+        need(np.isfinite(tilt[:, which]).any())  # an average over a tumbling has no figure axis
+        return tilt[:, which][:, 0], node[:, which][:, 0]
+    directions, plane = need(pole(dataset, axis)), reference_axes(dataset)
     x, y, z = (directions if plane is None else turned(directions, plane[0])).T
     longitude = np.arctan2(x, -y)
     finite = np.isfinite(longitude)

@@ -18,6 +18,7 @@ import xarray
 from rigidsim.look import signals
 from rigidsim.look.fits import secular
 from rigidsim.look.record import body_of, called, named_body, scene_of
+from rigidsim.look.signals import need, optional
 from rigidsim.look.solids import Array, rotation_matrix
 from rigidsim.scene.bodies.presets import KnownBody
 from rigidsim.scene.kepler import combined, eccentric_anomalies, plane_vectors
@@ -169,20 +170,22 @@ def librates(dataset: xarray.Dataset) -> bool:
     return keeps(ways, 0.5)
 
 
-def librations(dataset: xarray.Dataset) -> tuple[Array, Array | None] | None:
+@optional
+def librations(dataset: xarray.Dataset) -> tuple[Array, Array | None]:
     """Angles, rad, of a body that turns one face to its source: longitude (rows,) less its mean motion; and
     (rows, 2) inclination less its mean, and the node less its mean motion times the inclination's sine, which
     are None where the figure axis doesn't precess. None of other bodies.
     """
     scene, seconds = scene_of(dataset), signals.seconds(dataset)
-    rates, ways = signals.values(dataset, "angular_velocity", 3), toward(dataset)
-    swing, quaternion = signals.values(dataset, "libration", 2), signals.values(dataset, "quaternion", 4)
-    if rates is None or scene.moments is None or quaternion is None or len(seconds) < 3:
-        return None
-    long, figure = scene.axes[scene.moments.argmin()], scene.axes[scene.moments.argmax()]
-    cosine = np.zeros(1) if swing is None else np.cos(swing).prod(axis=1)
-    if not np.nanmin(np.abs(cosine if ways is None else ways @ long)) > _FACING:
-        return None
+    rates = need(signals.values(dataset, "angular_velocity", 3))
+    quaternion, ways = need(signals.values(dataset, "quaternion", 4)), toward(dataset)
+    moments = need(scene.moments)
+    long, figure = scene.axes[moments.argmin()], scene.axes[moments.argmax()]
+    if ways is None:
+        cosine = np.cos(need(signals.values(dataset, "libration", 2))).prod(axis=1)
+    else:
+        cosine = ways @ long
+    need(len(seconds) > 2 and np.nanmin(np.abs(cosine)) > _FACING)
     figure = figure * np.sign(np.nanmean(rates @ figure))
     pole, first, second = (rotation_matrix(quaternion) @ v for v in (figure, long, np.cross(figure, long)))
     normal, precesses = _normal(pole)
@@ -219,7 +222,8 @@ def steep(angles: Array) -> bool:
     return not np.nanmax(np.abs(angles[:, 1])) < _STEEP
 
 
-def pointing_angle(dataset: xarray.Dataset) -> tuple[str, str, Array] | None:
+@optional
+def pointing_angle(dataset: xarray.Dataset) -> tuple[str, str, Array]:
     """A body axis, a direction in words, and the angle (rows,), rad, between them: of the axis nearest to the
     oncoming air or, where no other angles show it, to the source, or to the only attractor of a body that
     keeps an axis towards it.
@@ -238,8 +242,8 @@ def pointing_angle(dataset: xarray.Dataset) -> tuple[str, str, Array] | None:
             ways, body = ways / signals.norms(ways)[:, None], body_of(bodies[0])
             ways = ways if np.linalg.norm(ways.mean(axis=0)) > _FACING else None
         towards = "the direction of " + called(body, "source")
-    if ways is None or not np.isfinite(ways).any():
-        return None
+    ways = need(ways)
+    need(np.isfinite(ways).any())
     mean = np.nanmean(ways / signals.norms(ways)[:, None], axis=0)
     k = int(np.abs(mean).argmax())
     sign = "" if mean[k] > 0 else "−"

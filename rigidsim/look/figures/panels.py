@@ -14,7 +14,7 @@ from rigidsim.look.figures.style import INK, Z, curve, key, square, titled
 from rigidsim.look.paths import PATHS, Path
 from rigidsim.look.plots import Plot, paper
 from rigidsim.look.record import scene_of
-from rigidsim.look.signals import clock
+from rigidsim.look.signals import clock, need, optional
 from rigidsim.look.solids import Array
 from rigidsim.scene.readable import scaled, with_unit
 
@@ -95,12 +95,11 @@ def _path(axes: Axes, path: Path) -> None:
     key(axes, path.title + (f" (+: {path.center})" if path.center else ""))
 
 
-def phases(dataset: xarray.Dataset) -> Panel | None:
+@optional
+def phases(dataset: xarray.Dataset) -> Panel:
     """Rates of libration, or of roll, pitch and yaw, against the angles; librations are closed curves."""
-    found = curves.swings(dataset) or curves.regular(dataset)
-    if found is None:
-        return None
-    table, names = found[0], found[1]["labels"]
+    table, options = need(curves.swings(dataset) or curves.regular(dataset))
+    names = options["labels"]
     rate = np.gradient(table, signals.seconds(dataset), axis=0)
     (scale, unit), (speed, speed_unit) = scaled(table, "rad"), scaled(rate, "rad/s")
 
@@ -113,11 +112,10 @@ def phases(dataset: xarray.Dataset) -> Panel | None:
     return drawn
 
 
-def locking_phases(dataset: xarray.Dataset) -> Panel | None:
+@optional
+def locking_phases(dataset: xarray.Dataset) -> Panel:
     """Rotation relative to the source against longitude within a turn: waves, and in the end a whirl."""
-    longitude, found = curves.locked_longitude(dataset), sources.seen(dataset)
-    if longitude is None or found is None:
-        return None
+    longitude, found = need(curves.locked_longitude(dataset)), need(sources.seen(dataset))
     rate = dataset["angular_velocity"].values @ scene_of(dataset).figure
     middle, rate = float(np.mean(longitude[found.last])), rate - np.mean(rate[found.last])
     rest = slice(int(np.argmax(np.abs(longitude - middle) < 2 * np.pi * _LAST_TURNS)), None)

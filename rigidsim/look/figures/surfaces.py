@@ -28,7 +28,7 @@ from rigidsim.look.figures.style import GREY, INK, MOST_VECTOR_POINTS, PALE, PIN
 from rigidsim.look.gyrostats import Gyrostat
 from rigidsim.look.paths import herpolhode_plane
 from rigidsim.look.record import scene_of
-from rigidsim.look.signals import joined
+from rigidsim.look.signals import joined, need, optional
 from rigidsim.look.solids import Array, rotation_matrix
 from rigidsim.scene.readable import scaled, typeset
 
@@ -173,12 +173,10 @@ class View:
             self.line(floor, color=PALE, lw=0.6, zorder=1)
 
 
-def surfaces(dataset: xarray.Dataset) -> tuple[Array, Array] | None:
+@optional
+def surfaces(dataset: xarray.Dataset) -> tuple[Array, Array]:
     """Semi-axes (3,), rad/s, of the surfaces of energy and momentum; None if the motion isn't on them."""
-    found = signals.energy_and_momentum(dataset)
-    if found is None:
-        return None
-    moments, twice, square = found
+    moments, twice, square = need(signals.energy_and_momentum(dataset))
     return np.sqrt(twice / moments), np.sqrt(square) / moments
 
 
@@ -205,12 +203,12 @@ def separatrix(moments: Array, radii: Array) -> list[Array]:
     return curves
 
 
-def polhode(dataset: xarray.Dataset) -> Draw | None:
+@optional
+def polhode(dataset: xarray.Dataset) -> Draw:
     """The tip of the angular velocity in principal axes, on the surfaces where it has some, else between axes
     with the ranges that it covers.
     """
-    rates = signals.path_of_rates(dataset)
-    return None if rates is None else partial(_polhode, dataset=dataset, rates=rates)
+    return partial(_polhode, dataset=dataset, rates=need(signals.path_of_rates(dataset)))
 
 
 def _polhode(axes: Axes, dataset: xarray.Dataset, rates: Array) -> None:
@@ -254,18 +252,18 @@ def _polhode_way(points: Array, radii: Array, moments: Array) -> Array:
     return max(ways, key=quality)
 
 
-def poinsot(dataset: xarray.Dataset) -> Draw | None:
+@optional
+def poinsot(dataset: xarray.Dataset) -> Draw:
     """The ellipsoid of energy as it rolls on the invariable plane, at the first sample."""
-    found, plane, rates = surfaces(dataset), herpolhode_plane(dataset), signals.principal_rates(dataset)
-    quaternion, along = signals.values(dataset, "quaternion"), signals.steady_momentum(dataset)
-    if found is None or plane is None or rates is None or quaternion is None or along is None:
-        return None
+    radii, rates = need(surfaces(dataset))[0], need(signals.principal_rates(dataset))
+    quaternion, along = need(signals.values(dataset, "quaternion")), need(signals.steady_momentum(dataset))
     # The picture's axes: across, across, and -L upwards, so that the plane lies below the body.
     first, second = signals.across(along)
     to_picture = np.stack([first, -second, -along])
     turn = to_picture @ rotation_matrix(quaternion[:1])[0] @ scene_of(dataset).axes.T
-    scale, _ = scaled(found[0], "rad/s")
-    return partial(_poinsot, radii=found[0] / scale, traced=plane / scale, points=rates / scale, turn=turn)
+    scale, _ = scaled(radii, "rad/s")
+    traced = herpolhode_plane(dataset) / scale
+    return partial(_poinsot, radii=radii / scale, traced=traced, points=rates / scale, turn=turn)
 
 
 def _poinsot(axes: Axes, radii: Array, traced: Array, points: Array, turn: Array) -> None:
@@ -290,15 +288,14 @@ def _poinsot(axes: Axes, radii: Array, traced: Array, points: Array, turn: Array
     key(axes, "It rolls on the invariable plane (Poinsot)")
 
 
-def sphere(dataset: xarray.Dataset, row: int) -> Draw | None:
+@optional
+def sphere(dataset: xarray.Dataset, row: int) -> Draw:
     """Levels of the energy at the first row, or at the last if motors have changed them, separatrices,
     equilibria, and the path of the run, its start and positive axes on the side that is seen.
     """
     driven = any(rotor.drive == "driven" for rotor in gyrostats.rotors(dataset))
-    whole = gyrostats.path(dataset) if row == 0 or driven else None
-    gyrostat = None if whole is None else Gyrostat.of(dataset, row)
-    if whole is None or gyrostat is None:
-        return None
+    need(row == 0 or driven)
+    whole, gyrostat = need(gyrostats.path(dataset)), need(Gyrostat.of(dataset, row))
     title = "Momentum sphere in body axes: levels of energy"
     if driven:
         title = f"Momentum sphere: levels of energy if motors stopped at the {'end' if row else 'start'}"
