@@ -26,9 +26,8 @@ import xarray
 
 import rigidsim
 from experiments.common import EPSILON, Answer, Check, Curve, Panel, Picture, Study
-from rigidsim.accuracy.comparison import angles_between
+from rigidsim.accuracy.comparison import angles_between, try_setting
 from rigidsim.accuracy.setting import Setting
-from rigidsim.accuracy.trial import try_setting
 
 STARTS = 12
 PER_DECADE = 4

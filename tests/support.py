@@ -18,9 +18,12 @@ import pytest
 import xarray
 
 import rigidsim
-from rigidsim.accuracy.comparison import angles_between  # noqa: F401  (for the tests)
+from rigidsim.accuracy.comparison import (
+    Trial,
+    angles_between,  # noqa: F401  (for the tests)
+    try_setting,
+)
 from rigidsim.accuracy.setting import Setting
-from rigidsim.accuracy.trial import Trial, try_setting
 from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.session.session import Tuning
 from rigidsim.solve import compiled

@@ -36,11 +36,10 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 import mpmath
 import numpy as np
 
-from rigidsim.accuracy.comparison import angles_between
+from rigidsim.accuracy.choice import LEAST_DIGITS, run_pilot
+from rigidsim.accuracy.comparison import Trial, angles_between, trial_scene, try_setting
 from rigidsim.accuracy.error_law import closed_form_if_any
-from rigidsim.accuracy.motion import LEAST_DIGITS, run_pilot
 from rigidsim.accuracy.setting import Setting, cost, epsilon, precision_title, precision_titled
-from rigidsim.accuracy.trial import Trial, trial_scene, try_setting
 from rigidsim.errors import ConfigError, RigidsimError
 from rigidsim.scene.choices import FORMULATIONS, METHODS
 from rigidsim.scene.config import Experiment, parse

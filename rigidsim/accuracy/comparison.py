@@ -1,21 +1,193 @@
-"""Comparison of attitudes with every digit, at the samples that matter."""
+"""Settings compared: a motion integrated in memory under one of them, without files, and how far two
+solutions are apart, with every digit.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from itertools import pairwise, zip_longest
 from typing import TYPE_CHECKING
 
 import mpmath
 import numpy as np
 
+from rigidsim.accuracy.setting import Setting
+from rigidsim.errors import ConfigError
+from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.exact import fraction_of
 from rigidsim.scene.parts_of_values import parts_in
-from rigidsim.scene.scene import build_scene
+from rigidsim.scene.sample_times import SampleTimes
+from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.solve.assembly import Assembly, assemble
+from rigidsim.solve.problem import InitialValueProblem, prepare_scene
+from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.sampler import Check, Progress, SampleReceiver
+from rigidsim.solve.status import Status
 
 if TYPE_CHECKING:
     import xarray
+
+# --- trials -------------------------------------------------------------------------------------------------
+
+_REPORT_EVERY = 0.05  # seconds
+
+TrialProgress = Callable[[str, float], None]
+"""Receives a setting's title and the progress of its trial (0 to 1), some tens of times per second."""
+
+
+class Collected(SampleReceiver):
+    """A prepared scene taken through its samples, with what is recorded kept in memory.
+
+    Attributes:
+        progress: how it ended.
+        parts: of the assembly that took it there.
+    """
+
+    def __init__(
+        self, prepared: InitialValueProblem, names: Sequence[str], check: Check = lambda _: None
+    ) -> None:
+        self.parts: Assembly = assemble(prepared)
+        self._pieces: dict[str, list[Sequence[np.ndarray]]] = {name: [] for name in names}
+        self.progress = self.parts.driver(self, check).run()
+
+    def take(self, block: SampleBlock) -> None:
+        """See ``SampleReceiver``."""
+        recorded = self.parts.evaluator.evaluate(block)
+        for name, pieces in self._pieces.items():
+            pieces.append(recorded[name])
+
+    def __getitem__(self, name: str) -> list[np.ndarray]:
+        """Float64 parts of a variable, its samples first."""
+        found = [np.concatenate(part) for part in zip(*self._pieces[name], strict=True)]
+        return [np.asarray(part, dtype=np.float64) for part in found]
+
+
+@dataclass
+class Trial:
+    """Result of a trial: attitudes and places (m; none without a position) as float64 parts (samples, 4 or
+    3), and the relative drift (samples,) of each invariant.
+    """
+
+    status: Status
+    attitudes: list[np.ndarray]
+    places: list[np.ndarray]
+    histories: dict[str, np.ndarray]
+    steps: int
+    order: int
+    states: int
+
+    @property
+    def drifts(self) -> dict[str, float]:
+        """Largest drift of each invariant."""
+        return {name: float(np.abs(drift).max(initial=0.0)) for name, drift in self.histories.items()}
+
+    @property
+    def work(self) -> float:
+        """Steps times order squared times states, which doesn't jitter as CPU time does."""
+        return float(self.steps) * self.order**2 * self.states
+
+
+def trial_scene(
+    experiment: Experiment,
+    setting: Setting,
+    times: Sequence[mpmath.mpf] | None = None,
+    *,
+    repeating: bool = False,
+) -> Scene:
+    """The scene of an experiment under another setting, recording its attitude, and its path where an
+    accuracy of that is asked for; ``repeating`` holds invariants as the experiment does. Raises
+    ``ConfigError``.
+    """
+    given = experiment.config.integrator
+    changed = experiment.config.as_motion(
+        ["quaternion"] + ["position"] * (given.accuracy_position is not None),
+        precision=setting.precision,
+        tolerance="auto",
+        formulation=setting.formulation,
+        hold_invariants=given.hold_invariants if repeating else setting.hold_invariants,
+        method=setting.method,
+    )
+    scene = build_scene(replace(experiment, config=changed))
+    if times is None:
+        return scene
+    exact = [fraction_of(t) for t in times]
+    return replace(scene, samples=SampleTimes.listed(scene.samples.begin, exact, scene.context))
+
+
+def try_setting(
+    experiment: Experiment,
+    setting: Setting,
+    times: Sequence[mpmath.mpf] | None = None,
+    *,
+    loads: Sequence[Load] = (),
+    go_on: Check = lambda _: None,
+    report: TrialProgress | None = None,
+    compact: bool = False,
+    repeating: bool = False,
+) -> Trial:
+    """Integrate an experiment's motion under a setting, which replaces its ``[integrator]``. Compact code
+    compiles in a tenth of the time and takes up to twice as long per step in double precision, as long in the
+    others; rounding differs. Raises ``ConfigError`` if the scene can't be integrated so.
+    """
+    scene = trial_scene(experiment, setting, times, repeating=repeating)
+    samples, early = scene.samples, 0
+    if samples.times is not None and samples.times[0] != samples.begin:
+        # a motion begins at its first sample, which must be its start
+        early, whole = 1, [samples.begin, *samples.times]
+        scene = replace(scene, samples=SampleTimes.listed(samples.begin, whole, scene.context))
+    prepared = prepare_scene(experiment, scene, loads=loads, tolerance=setting.tolerance)
+    if compact:
+        prepared = compactly(prepared)
+    invariants = [invariant.name for invariant in prepared.system.invariants]
+    recorded = [r.name for r in prepared.system.recorded if r.name in ("quaternion", "position")]
+    start, length, latest = float(scene.start), float(samples.last - scene.start), 0.0
+
+    def check(progress: Progress) -> Status | None:
+        nonlocal latest
+        if report is not None and time.monotonic() - latest > _REPORT_EVERY and length:
+            latest = time.monotonic()
+            report(setting.title, min(1.0, (progress.time - start) / length))
+        return go_on(progress)
+
+    found = Collected(prepared, [*recorded, *(f"{name}_drift" for name in invariants)], check)
+    return Trial(
+        status=found.progress.status,
+        attitudes=[part[early:] for part in found["quaternion"]],
+        places=[part[early:] for part in found["position"]] if "position" in recorded else [],
+        histories={x: drift.ravel() for x in invariants for drift in found[f"{x}_drift"][:1]},
+        steps=found.progress.steps,
+        order=found.parts.order or 0,
+        states=len(prepared.system.states),
+    )
+
+
+def finished_trial(
+    experiment: Experiment,
+    setting: Setting,
+    times: Sequence[mpmath.mpf],
+    loads: Sequence[Load],
+    report: TrialProgress | None,
+) -> Trial | None:
+    """A trial in compact code that reached the last of the times (s, mpf); None if the scene can't be
+    integrated with the setting (a chart, a load, no closed form), or not so far.
+    """
+    with suppress(ConfigError):
+        made = try_setting(experiment, setting, times, loads=loads, compact=True, report=report)
+        return made if made.status is Status.FINISHED else None
+    return None
+
+
+def compactly(prepared: InitialValueProblem) -> InitialValueProblem:
+    """The same problem, to be compiled in compact mode."""
+    return replace(prepared, precision=replace(prepared.precision, compact=True))
+
+
+# --- how far they are apart ---------------------------------------------------------------------------------
 
 
 def angles_between(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.ndarray:
@@ -58,17 +230,6 @@ def rotation_vectors(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> 
     size = np.linalg.norm(sine, axis=1)
     angle = turns * np.arctan2(size, 1.0 + np.einsum("ij,ij->i", first, apart))
     return np.asarray(sine * np.where(size > 0, angle / np.where(size > 0, size, 1.0), turns)[:, None])
-
-
-def spread_times(experiment: Experiment, count: int, until: float = 1.0) -> list[mpmath.mpf]:
-    """Up to ``count`` times over the first part ``until`` of a run, its end included, as mpf.
-
-    Each is a double, so that every precision from double on means the same moment by it.
-    """
-    scene = build_scene(experiment)
-    start, last = float(scene.start), float(scene.samples.last)
-    grid = start + (last - start) * until * np.arange(1, count + 1) / count
-    return [mpmath.mpf(float(t)) for t in grid]
 
 
 def rows_to_compare(dataset: xarray.Dataset, most: int) -> np.ndarray:

@@ -15,7 +15,7 @@ def round_off_law(tolerance: float, steps: int, rate: float, duration: float) ->
     """Attitude error (rad) of a good integration: (eps / 2) sqrt(steps) |w| t / sqrt 3.
 
     Rounding lets the frequencies wander as a random walk, and the phase integrates the walk (Brouwer 1937).
-    Motions near an unstable axis amplify errors further: see ``rigidsim.accuracy.motion``.
+    Motions near an unstable axis amplify errors further: see ``rigidsim.accuracy.choice``.
     """
     return tolerance / 2 * math.sqrt(max(steps, 1)) * rate * duration / math.sqrt(3)
 

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.accuracy.trial import Collected, compactly
+from rigidsim.accuracy.comparison import Collected, compactly
 from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.average import DIRECTION, Average, osculating
 from rigidsim.model.averaged.free_motion import FreeMotion, Wobble

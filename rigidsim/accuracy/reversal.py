@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigidsim.accuracy.comparison import angles_between, distances_between
+from rigidsim.accuracy.comparison import Collected, angles_between, distances_between
 from rigidsim.accuracy.estimates.estimate import estimate_errors
-from rigidsim.accuracy.trial import Collected
 from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.model.load import Load
 from rigidsim.model.system import System

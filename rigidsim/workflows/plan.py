@@ -9,10 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.accuracy.choice import CHEAPEST_FIRST, LevelChoice, choose_level, chosen
+from rigidsim.accuracy.choice import (
+    CHEAPEST_FIRST,
+    LevelChoice,
+    Pilot,
+    choose_level,
+    chosen,
+    growth_of,
+    run_pilot,
+)
 from rigidsim.accuracy.error_law import closed_form_if_any, held_error, stable_law
 from rigidsim.accuracy.modelling import Unmeasured, measure_modelling
-from rigidsim.accuracy.motion import Pilot, growth_of, run_pilot
 from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.average import reads_rates_alone
 from rigidsim.model.equation_text import equation_texts

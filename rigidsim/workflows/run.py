@@ -12,8 +12,7 @@ from typing import Any, TypeVar, overload
 
 import numpy as np
 
-from rigidsim.accuracy.certificate import certify, verdict
-from rigidsim.accuracy.choice import Choice, choose_level, chosen
+from rigidsim.accuracy.choice import Choice, certify, choose_level, chosen, verdict
 from rigidsim.accuracy.setting import Setting, asked_of_attitude, leaves_choice, wanted
 from rigidsim.errors import ConfigError, RunFolderError
 from rigidsim.model.load import Load

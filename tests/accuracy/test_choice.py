@@ -15,11 +15,9 @@ from support import run_estimated as run_text
 import rigidsim
 from experiments.random_scenes import KINDS, random_scene
 from rigidsim import ConfigError
-from rigidsim.accuracy.certificate import certify
-from rigidsim.accuracy.choice import choose, chosen
-from rigidsim.accuracy.comparison import angles_between
+from rigidsim.accuracy.choice import certify, choose, chosen
+from rigidsim.accuracy.comparison import angles_between, try_setting
 from rigidsim.accuracy.setting import Setting
-from rigidsim.accuracy.trial import try_setting
 
 FREE = config(name="free", estimate=True)
 CHAOTIC = config(

@@ -7,9 +7,9 @@ from support import angles_between, config, unoptimised_code
 from support import run_estimated as run_text
 
 import rigidsim
+from rigidsim.accuracy.comparison import Collected, try_setting
 from rigidsim.accuracy.estimates.estimate import UNCERTAIN, estimate_errors
 from rigidsim.accuracy.setting import Setting
-from rigidsim.accuracy.trial import Collected, try_setting
 from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.solve.problem import prepare
 

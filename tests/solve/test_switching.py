@@ -14,8 +14,8 @@ from support import EPSILON, angles_between, cases, config
 
 import rigidsim
 from rigidsim import ConfigError
+from rigidsim.accuracy.comparison import try_setting
 from rigidsim.accuracy.setting import Setting
-from rigidsim.accuracy.trial import try_setting
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sample_block import SampleBlock
