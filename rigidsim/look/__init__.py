@@ -9,7 +9,7 @@ rerun, `figures` matplotlib. All else is numbers and texts, for both.
 | `figures` | figures by name, dataset to matplotlib, PNG or SVG; a package of its own |
 | `figure_names` | their names, without any import |
 | `record`, `signals` | the recorded scene of a dataset; its quantities and times |
-| `curves`, `paths`, `plots` | what is drawn over time, and in planes, in one form for both |
+| `curves`, `paths` | what is drawn over time, and in planes, in one form for both |
 | `pages` | what a scene shows first, its numbers in words, pages of text |
 | `stages` | stages by kind of scene, as entities of rerun; a package of its own |
 | `sources`, `gyrostats` | what pulls at a body, and librations; bodies with rotors |

@@ -7,9 +7,8 @@ import numpy as np
 import xarray
 
 from rigidsim.look import gyrostats, signals, sources
-from rigidsim.look.curves import CURVES, STATES, orientations, plotted, precesses
+from rigidsim.look.curves import CURVES, STATES, Plot, orientations, plotted, precesses
 from rigidsim.look.fits import circulation, secular, turn_text
-from rigidsim.look.plots import Plot
 from rigidsim.look.record import scene_of
 from rigidsim.look.signals import title_of
 from rigidsim.look.solids import Array

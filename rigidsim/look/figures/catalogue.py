@@ -23,12 +23,11 @@ from matplotlib.gridspec import SubplotSpec
 from matplotlib.text import Text
 
 from rigidsim.look import signals
-from rigidsim.look.curves import CURVES, STATES
+from rigidsim.look.curves import CURVES, HUES, STATES, Plot, moves, paper, screen
 from rigidsim.look.figure_names import FIGURES, OVERVIEW, SPECTRUM
 from rigidsim.look.figures.panels import MANY, PLANES, Panel, draw
 from rigidsim.look.figures.style import GREY, INK, PALE, START, STYLE, blank
 from rigidsim.look.pages import leading, numbers
-from rigidsim.look.plots import HUES, Plot, moves, paper, screen
 from rigidsim.look.signals import clock
 from rigidsim.look.thinning import thin
 from rigidsim.scene.parts_of_values import in_time_order

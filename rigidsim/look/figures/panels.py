@@ -9,10 +9,10 @@ import xarray
 from matplotlib.axes import Axes
 
 from rigidsim.look import curves, paths, signals, sources
+from rigidsim.look.curves import Plot, paper
 from rigidsim.look.figures import style, surfaces
 from rigidsim.look.figures.style import INK, Z, curve, key, square, titled
 from rigidsim.look.paths import PATHS, Path
-from rigidsim.look.plots import Plot, paper
 from rigidsim.look.record import scene_of
 from rigidsim.look.signals import clock, need, optional
 from rigidsim.look.solids import Array

@@ -18,8 +18,8 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import MaxNLocator
 
-from rigidsim.look.plots import HUES, XYZ
-from rigidsim.look.plots import PALETTE as NAMES
+from rigidsim.look.curves import HUES, XYZ
+from rigidsim.look.curves import PALETTE as NAMES
 from rigidsim.look.signals import finite_rows, joined, title_of
 from rigidsim.look.solids import Array
 

@@ -16,7 +16,7 @@ import rerun as rr
 import xarray
 from numpy.typing import NDArray
 
-from rigidsim.look.plots import Plot
+from rigidsim.look.curves import Plot
 from rigidsim.look.signals import across, finite_rows, joined, norms, seconds, values
 from rigidsim.look.solids import Array, Color, Mesh, sharp_edges
 from rigidsim.look.thinning import thinned_indices

@@ -7,8 +7,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint.components import LinkAxis
 
+from rigidsim.look.curves import Plot
 from rigidsim.look.paths import Path
-from rigidsim.look.plots import Plot
 from rigidsim.look.stages.parts import Color, Stage
 from rigidsim.look.timeline import entities
 from rigidsim.look.timeline.drawn import Clock, DrawnRun

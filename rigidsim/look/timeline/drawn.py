@@ -12,10 +12,9 @@ import xarray
 from numpy.typing import NDArray
 
 from rigidsim.look import signals
-from rigidsim.look.curves import CURVES
+from rigidsim.look.curves import CURVES, Plot, drift_plot, other_plots
 from rigidsim.look.pages import config_page, leading, notes_page, summary_page
 from rigidsim.look.paths import PATHS, Path, sections
-from rigidsim.look.plots import Plot, drift_plot, other_plots
 from rigidsim.look.solids import Array
 from rigidsim.look.stages.parts import Part, Picture, Rows, Stage, screen_seconds
 from rigidsim.look.stages.registry import build_picture

@@ -8,8 +8,8 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from rigidsim.look.curves import Plot, screen
 from rigidsim.look.paths import Path
-from rigidsim.look.plots import Plot, screen
 from rigidsim.look.signals import joined
 from rigidsim.look.solids import Array, Color
 from rigidsim.look.stages.parts import NEAR, Columns, Part, Rows, Stage, points_wide

@@ -16,8 +16,8 @@ import rerun.blueprint as rrb
 import xarray
 from rerun.error_utils import set_strict_mode, strict_mode
 
+from rigidsim.look.curves import HUES, PALETTE, Plot
 from rigidsim.look.pages import legible
-from rigidsim.look.plots import HUES, PALETTE, Plot
 from rigidsim.look.signals import seconds as seconds_of
 from rigidsim.look.signals import title_of, values
 from rigidsim.look.solids import Array
