@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import io
 import os
-import subprocess
-import tempfile
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
+from itertools import chain
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 from PIL import Image
 
-from rigidsim.look.viewer import LOOPBACK, QUIET, existing, free_port, viewer_binary
+from rigidsim.look.viewer import LOOPBACK, existing, free_port, running
 
 FORMATS = (".png", ".gif", ".mp4")
 SIZE = (1600, 900)
@@ -90,18 +90,13 @@ def _write_gif(target: Path, frames: Iterator[Image.Image], rate: int) -> None:
 
 
 def _write_mp4(encoder: Any, target: Path, frames: Iterator[Image.Image], rate: int) -> None:
-    writer = None
-    try:
-        for frame in frames:
-            width, height = (size - size % 2 for size in frame.size)  # as the codec wants them
-            if writer is None:
-                options = {"fps": rate, "codec": "libx264", "quality": 7, "macro_block_size": 2}
-                writer = encoder.write_frames(str(target), (width, height), **options)
-                writer.send(None)
-            writer.send(frame.crop((0, 0, width, height)).tobytes())
-    finally:
-        if writer is not None:
-            writer.close()
+    first = next(frames)
+    size = first.width - first.width % 2, first.height - first.height % 2  # as the codec wants them
+    options = {"fps": rate, "codec": "libx264", "quality": 7, "macro_block_size": 2}
+    with closing(encoder.write_frames(str(target), size, **options)) as writer:
+        writer.send(None)
+        for frame in chain([first], frames):
+            writer.send(frame.crop((0, 0, *size)).tobytes())
 
 
 def _encoder() -> Any:
@@ -124,8 +119,7 @@ class HeadlessViewer:
     """
 
     def __init__(self, path: Path, *, size: tuple[int, int] = SIZE) -> None:
-        self._path = existing(path)
-        self._size = size
+        self._path, self._size, self._port = existing(path), size, free_port()
         self._deadline = time.monotonic() + _PATIENCE
         self.client: Any = None
         self.timeline = ""  # that the page opened on, and its first and last integer
@@ -137,29 +131,16 @@ class HeadlessViewer:
                 "no Vulkan driver found: a headless picture needs one, for example Mesa's lavapipe "
                 "(apt-get install mesa-vulkan-drivers)"
             )
-        self._home = tempfile.TemporaryDirectory()
-        self._port = free_port()
-        command = [str(viewer_binary()), str(self._path.resolve()), "--headless"]
-        command += ["--bind", LOOPBACK, "--port", str(self._port)]
+        command = [str(self._path.resolve()), "--headless", "--port", str(self._port)]
         command += ["--window-size", f"{self._size[0]}x{self._size[1]}"]
-        # A home of its own: none of the user's settings, and nothing left among temporary files.
-        home = self._home.name
-        environment = os.environ | QUIET | {"TMPDIR": home}
-        environment |= {"HOME": home, "XDG_CONFIG_HOME": home, "XDG_DATA_HOME": home}
-        self._log = Path(home) / "viewer.log"
-        with self._log.open("wb") as output:
-            self.process = subprocess.Popen(command, env=environment, stdout=output, stderr=output)
-        try:
+        with ExitStack() as stack:
+            self.process, self._log = stack.enter_context(running(command, own_home=True))
             self._open()
-        except BaseException:
-            self.__exit__()
-            raise
+            self._stack = stack.pop_all()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.process.terminate()
-        self.process.wait()
-        self._home.cleanup()
+        self._stack.close()
 
     def seek(self, share: float) -> None:
         """Go to a place in the run, 0 to 1, and stay there."""

@@ -10,10 +10,10 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 if TYPE_CHECKING:
@@ -88,31 +88,44 @@ def follow(read: Callable[[], tuple[xarray.Dataset | None, bool]], *, web: bool 
 def _running(
     recording: Sequence[str], port: int, windowed: Sequence[str], *, web: bool
 ) -> Iterator[subprocess.Popen[bytes]]:
-    """A viewer that is ended with the context, and given a place for temporary files that goes with it, where
-    it would leave a folder for its catalogue.
-    """
+    """A viewer in a window, or for a browser."""
     if not web and not has_display():
         raise NoDisplay(
             "there is no display here (neither DISPLAY nor WAYLAND_DISPLAY is set); --web serves the viewer "
             "to a browser on this machine (on another one through a tunnel: ssh -L 9090:127.0.0.1:9090 "
             "-L 9876:127.0.0.1:9876 HOST), and --png, --gif or --mp4 FILE draw without one"
         )
-    command = [str(viewer_binary()), *recording, "--bind", LOOPBACK]
-    environment = os.environ | QUIET
+    command, quiet = [*recording, *windowed], {}
     if web:  # only errors are reported
-        command += ["--serve-web", "--port", str(port), "--web-viewer-port", str(WEB_PORT)]
-        environment |= {"RUST_LOG": os.environ.get("RUST_LOG", "warn")}
-    else:
-        command += windowed
-    with tempfile.TemporaryDirectory(prefix="rigidsim-viewer-") as scratch:
-        process = subprocess.Popen(command, env={**environment, "TMPDIR": scratch})
+        command = [*recording, "--serve-web", "--port", str(port), "--web-viewer-port", str(WEB_PORT)]
+        quiet = {"RUST_LOG": os.environ.get("RUST_LOG", "warn")}
+    with running(command, **quiet) as (process, _):
+        if web:
+            # dark, as the page's colours are made for
+            source = quote(f"rerun+http://{LOOPBACK}:{port}/proxy", safe="")
+            page = f"http://{LOOPBACK}:{WEB_PORT}?theme=dark&url={source}"
+            print(f"open {page} in a browser on this machine; Ctrl-C ends it", flush=True)
+        yield process
+
+
+@contextmanager
+def running(
+    arguments: Sequence[str], *, own_home: bool = False, **environment: str
+) -> Iterator[tuple[subprocess.Popen[bytes], Path]]:
+    """A viewer that is ended with the context, and given a place for temporary files that goes with it, where
+    it would leave a folder for its catalogue; with a home of its own, without the user's settings, whose log
+    is the file that comes with it.
+    """
+    command = [str(viewer_binary()), *arguments, "--bind", LOOPBACK]
+    with tempfile.TemporaryDirectory(prefix="rigidsim-viewer-") as scratch, ExitStack() as files:
+        environment |= QUIET | {"TMPDIR": scratch}
+        log, output = Path(scratch) / "viewer.log", dict[str, Any]()
+        if own_home:
+            environment |= dict.fromkeys(("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME"), scratch)
+            output = dict.fromkeys(("stdout", "stderr"), files.enter_context(log.open("wb")))
+        process = subprocess.Popen(command, env=os.environ | environment, **output)
         try:
-            if web:
-                # dark, as the page's colours are made for
-                source = quote(f"rerun+http://{LOOPBACK}:{port}/proxy", safe="")
-                page = f"http://{LOOPBACK}:{WEB_PORT}?theme=dark&url={source}"
-                print(f"open {page} in a browser on this machine; Ctrl-C ends it", flush=True)
-            yield process
+            yield process, log
         finally:
             process.terminate()
             process.wait()
