@@ -12,7 +12,6 @@ from rigidsim.look.signals import values
 from rigidsim.look.solids import Mesh, ball, body_meshes, point_positions, rotation_matrix
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.parts import BODY, CENTRE, Array, Camera, Part, Stage, arrow, trail
-from rigidsim.scene.bodies.presets import KnownBody
 
 FIELD = np.deg2rad(55.0)  # field of view from bottom to top (rad), the viewer's own
 USUAL_VIEW = (float(np.deg2rad(24.0)), float(np.deg2rad(-55.0)))
@@ -48,7 +47,8 @@ class Subject:
         meshes, points = body_meshes(solids), point_positions(solids)
         host = named_body(scene_of(dataset).host) if solids and solids[0].get("equivalent") else None
         if host is not None:  # known by its moments alone, but by its name as well
-            meshes, solids = [ball(host.radius, host.radius, host.radius)], [_sphere(host)]
+            sphere = {"solid": "sphere", "dimensions": {"radius": host.radius}, "name": host.name.lower()}
+            meshes, solids = [ball(host.radius, host.radius, host.radius)], [sphere]
         reach = max(mesh.reach() for mesh in meshes)
         quaternion = values(dataset, "quaternion", 4)
         return cls(
@@ -88,10 +88,6 @@ class Subject:
         corners = np.concatenate([mesh.vertices for mesh in self.meshes])
         _, spread, axes = np.linalg.svd(corners - corners.mean(axis=0), full_matrices=False)
         return axes[2] if spread[2] < _FLAT * spread[1] else None
-
-
-def _sphere(body: KnownBody) -> dict[str, Any]:
-    return {"solid": "sphere", "dimensions": {"radius": body.radius}, "name": body.name.lower()}
 
 
 def vectors_of(
@@ -198,9 +194,7 @@ def _facing(normals: Array) -> tuple[float, float]:
     """Elevation and azimuth (rad) from which a plate with normals (rows, 3) shows its face most often."""
     normals = signals.finite_rows(normals)
     _, ways = np.linalg.eigh(normals.T @ normals)
-    way = ways[:, -1] * (1.0 if ways[2, -1] >= 0 else -1.0)
-    elevation = np.clip(np.arcsin(way[2]), np.deg2rad(20.0), np.deg2rad(42.0))
-    return float(elevation), float(np.arctan2(way[1], way[0]) + np.deg2rad(20.0))
+    return _onto(ways[:, -1], 42.0, 20.0)
 
 
 def plane_view(points: Array) -> tuple[float, float]:
@@ -209,11 +203,15 @@ def plane_view(points: Array) -> tuple[float, float]:
     _, spread, axes = np.linalg.svd(finite - finite.mean(axis=0), full_matrices=False)
     if len(spread) < 3 or spread[1] < 0.05 * spread[0]:  # a point or a line lies in no one plane
         return USUAL_VIEW
-    normal = axes[2] if axes[2, 2] >= 0 else -axes[2]
-    elevation = np.clip(np.arcsin(normal[2]), np.deg2rad(20.0), np.deg2rad(55.0))
-    tilted = np.hypot(normal[0], normal[1]) > 0.05
-    azimuth = np.arctan2(normal[1], normal[0]) - np.deg2rad(30.0) if tilted else np.deg2rad(-55.0)
-    return float(elevation), float(azimuth)
+    elevation, azimuth = _onto(axes[2], 55.0, -30.0)
+    return elevation, azimuth if np.hypot(axes[2, 0], axes[2, 1]) > 0.05 else USUAL_VIEW[1]
+
+
+def _onto(normal: Array, highest: float, beside: float) -> tuple[float, float]:
+    """Elevation, at most so many degrees, and azimuth (rad) of a view onto a plane, beside its normal."""
+    normal = normal if normal[2] >= 0 else -normal
+    elevation = np.clip(np.arcsin(normal[2]), np.deg2rad(20.0), np.deg2rad(highest))
+    return float(elevation), float(np.arctan2(normal[1], normal[0]) + np.deg2rad(beside))
 
 
 def with_track(subject: Subject, shown: list[Part], notes: list[str]) -> list[Stage]:

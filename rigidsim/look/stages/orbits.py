@@ -79,25 +79,16 @@ def satellite(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
         quaternion = multiplied(quaternion_of(local), of_euler("zyx", angles[:, ::-1]))
     planet = body_of(listed[0])
     known = replace(subject, quaternion=quaternion, attitude=rotation_matrix(quaternion))
-    notes = []
-    if not _is_far(source, planet):
-        notes.append("in the local frame the planet's surface is drawn near the body, and not to scale")
-    whole = -kepler_path(orbit, _revolution(orbit))
+    # so far away that it is no horizon below the body
+    far = planet is not None and float(np.nanmin(signals.norms(source))) > _FAR * planet.radius
+    near = "in the local frame the planet's surface is drawn near the body, and not to scale"
+    notes = [] if far else [near]
+    whole = -kepler_path(orbit, np.linspace(0.0, 2 * np.pi / orbit["mean_motion"], 361))
     stages = [
-        _in_local_frame(dataset, known, local, planet, far=_is_far(source, planet)),
+        _in_local_frame(dataset, known, local, planet, far=far),
         _orbit(known, -source, planet, notes, whole),
     ]
     return Picture("satellite on its orbit", stages, notes)
-
-
-def _is_far(path: Array, planet: _Planet) -> bool:
-    """Whether a planet is so far away that it is no horizon below the body."""
-    return planet is not None and float(np.nanmin(signals.norms(path))) > _FAR * planet.radius
-
-
-def _revolution(orbit: dict[str, float]) -> Array:
-    """Times (361,), s, of one revolution from time zero."""
-    return np.linspace(0.0, 2 * np.pi / orbit["mean_motion"], 361)
 
 
 def local_frame(position: Array, normal: Array) -> Array:
@@ -226,13 +217,7 @@ def flight(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
 def _level_axes(points: Array, up: Array) -> tuple[Array, Array]:
     """Two level unit vectors, the first along the path's longest level extent."""
     flat = points - np.outer(points @ up, up)
-    flat = flat - flat.mean(axis=0)
-    _, spread, axes = np.linalg.svd(flat, full_matrices=False)
-    first = axes[0]
-    if spread[0] < 1e-9 or abs(first @ up) > 0.5:
-        first, _ = signals.across(up)
-    if (points[-1] - points[0]) @ first < 0:
-        first = -first
-    first = first - up * (first @ up)
-    first = first / np.linalg.norm(first)
+    _, spread, axes = np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)
+    first = axes[0] if spread[0] > 1e-9 else signals.across(up)[0]
+    first = first if (points[-1] - points[0]) @ first >= 0 else -first
     return first, np.cross(up, first)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import rerun as rr
@@ -32,33 +32,34 @@ _EXACT = 4 * np.finfo(np.float64).eps
 _UNIX_EPOCH = Fraction(4881175, 2)  # Julian date of 1970-01-01
 _DATED_NANOSECONDS = 8.5e18  # from 1970, 270 years: what the viewer's calendar surely holds
 _RESOLUTION = 1e-3  # of the smallest step: what a tick of the timeline may be at most
+_DTYPES = {"duration": "timedelta64[ns]", "timestamp": "datetime64[ns]", "sequence": "int64"}
 MOST_LEADING = 3  # plots beside the scene
 CHUNK = 4096  # rows per chunk: larger ones make the viewer slow, smaller ones heavy
 
 
 @dataclass(frozen=True)
 class Clock:
-    """Times of the rows as integers (rows,) of a viewer timeline: nanoseconds of a duration or, with
-    ``since``, of dates (counted from 1970, of which time 0 is so many), or ticks named by it.
+    """Times of the rows as integers (rows,) of a viewer timeline: nanoseconds of a "duration", or of a
+    "timestamp" (from 1970; time 0 is ``since``), or ticks of a "sequence", whose name has the unit.
     """
 
     name: str
     ticks: NDArray[np.int64]
     seconds_per_tick: float
-    duration: bool
-    since: int | None = None
+    kind: str
+    since: int = 0
 
     @property
     def in_nanoseconds(self) -> bool:
         """Whether the viewer knows how long a tick is."""
-        return self.duration or self.since is not None
+        return self.kind != "sequence"
 
 
 def dated(clock: Clock, epoch: Epoch | None) -> Clock:
     """The clock with dates in the epoch's scale (TT for UTC) in place of durations, if they are those of a
     calendar that the viewer has (1700 to 2240); the same clock otherwise.
     """
-    if epoch is None or not clock.duration:
+    if epoch is None or clock.kind != "duration":
         return clock
     epoch = epoch.uniform()  # leap seconds of UTC have no place on an axis
     days = epoch.julian_date() - _UNIX_EPOCH
@@ -66,7 +67,7 @@ def dated(clock: Clock, epoch: Epoch | None) -> Clock:
     first, last = since + int(clock.ticks.min()), since + int(clock.ticks.max())
     if not all(abs(x) < _DATED_NANOSECONDS for x in (first, last)):
         return clock
-    return Clock(f"date ({epoch.scale})", clock.ticks + since, clock.seconds_per_tick, False, since)
+    return Clock(f"date ({epoch.scale})", clock.ticks + since, clock.seconds_per_tick, "timestamp", since)
 
 
 def build_clock(seconds: NDArray[np.float64]) -> Clock:
@@ -92,20 +93,20 @@ def build_clock(seconds: NDArray[np.float64]) -> Clock:
         ticks = floor.astype(np.int64) * 1_000_000_000 + part.astype(np.int64)
         exact = bool((np.abs(ticks * 1e-9 - times) <= _EXACT * np.abs(times)).all())
         if smallest * _RESOLUTION >= 1e-9 or exact:
-            return Clock("time", ticks, 1e-9, True)
+            return Clock("time", ticks, 1e-9, "duration")
 
     for symbol, unit in _WHOLE:
         whole = np.rint(times / unit)
         exact = bool((np.abs(times - whole * unit) <= _EXACT * np.abs(times)).all())
         if exact and unit <= smallest and largest / unit < 2.0**53:
-            return Clock(f"time [{symbol}]", whole.astype(np.int64), unit, False)
+            return Clock(f"time [{symbol}]", whole.astype(np.int64), unit, "sequence")
     exponent = 3 * math.floor(math.log10(smallest * _RESOLUTION * (1 + 1e-9)) / 3)
     while largest / 10.0**exponent > _LARGEST:
         exponent += 3
     # Powers of ten to 22 are exact in float64, their reciprocals aren't: multiply or divide.
     scaled = times * 10.0**-exponent if exponent < 0 else times / 10.0**exponent
     name = f"time [{_UNITS.get(exponent, f'1e{exponent} s')}]"
-    return Clock(name, np.rint(scaled).astype(np.int64), 10.0**exponent, False)
+    return Clock(name, np.rint(scaled).astype(np.int64), 10.0**exponent, "sequence")
 
 
 @dataclass(frozen=True)
@@ -196,27 +197,26 @@ class DrawnRun:
                 recording.log(path, *part.static, static=True)
         for lane in self.states:
             ticks = np.rint(lane.seconds / self.clock.seconds_per_tick).astype(np.int64)
-            entities.draw_states(recording, lane, [self._clock_column(ticks + (self.clock.since or 0))])
+            entities.draw_states(recording, lane, [self._clock_column(ticks + self.clock.since)])
         count = len(self.seconds)
         for start in range(first, count, CHUNK):
             before(count - start)
             rows = slice(start, min(start + CHUNK, count))
+            times = self._times(rows)
             for path, part in shown:
                 if part.columns is not None:
                     picked = part.picked(rows)
                     if len(self.steps[picked]):
-                        columns = part.columns(picked)
-                        recording.send_columns(path, indexes=self._times(picked), columns=columns)
+                        plain = part.stride == 1 and part.only is None
+                        indexes, columns = times if plain else self._times(picked), part.columns(picked)
+                        recording.send_columns(path, indexes=indexes, columns=columns)
 
     def _times(self, rows: Rows) -> list[rr.TimeColumn]:
         return [self._clock_column(self.clock.ticks[rows]), rr.TimeColumn("step", sequence=self.steps[rows])]
 
     def _clock_column(self, ticks: NDArray[np.int64]) -> rr.TimeColumn:
-        if self.clock.since is not None:
-            return rr.TimeColumn(self.clock.name, timestamp=ticks.astype("datetime64[ns]"))
-        if self.clock.duration:
-            return rr.TimeColumn(self.clock.name, duration=ticks.astype("timedelta64[ns]"))
-        return rr.TimeColumn(self.clock.name, sequence=ticks)
+        values: Any = {self.clock.kind: ticks.astype(_DTYPES[self.clock.kind])}
+        return rr.TimeColumn(self.clock.name, **values)
 
 
 def _about(rows: xarray.Dataset, extremes: xarray.Dataset, picture: Picture) -> tuple[list[Plot], list[Path]]:
