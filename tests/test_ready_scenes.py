@@ -10,6 +10,8 @@ from support import CONFIGS, EPSILON, amplification, angle_between, cases, law, 
 
 import rigidsim
 
+pytestmark = pytest.mark.optimised  # they are long
+
 Ready = Callable[..., rigidsim.Run]
 ATTITUDE = 'output.record=["angular_velocity", "quaternion"]'
 AVERAGED = [path for path in CONFIGS if rigidsim.load(path).config.model.reduced]

@@ -24,7 +24,8 @@ from rigidsim.look.timeline.drawn import DrawnRun
 from rigidsim.look.timeline.writing import recording_to
 
 pytestmark = [
-    pytest.mark.skipif(not vulkan_drivers(), reason="no Vulkan driver: apt-get install mesa-vulkan-drivers")
+    pytest.mark.skipif(not vulkan_drivers(), reason="no Vulkan driver: apt-get install mesa-vulkan-drivers"),
+    pytest.mark.optimised,  # ready scenes are long
 ]
 
 Ready = Callable[..., rigidsim.Run]
