@@ -14,8 +14,9 @@ import numpy as np
 import xarray
 
 from rigidsim.analysis.analyse import analyse_dataset
-from rigidsim.analysis.result import SignalAnalysis, SpectralLine
+from rigidsim.analysis.result import SignalAnalysis
 from rigidsim.errors import RigidsimError
+from rigidsim.look.signals import need, optional
 from rigidsim.look.solids import Array
 from rigidsim.scene.readable import period_text
 
@@ -63,8 +64,8 @@ def secular(time: Array, angle: Array) -> SecularLine:
         return SecularLine(
             float(found.value.real), float(found.rate.real), float(middle), True, found.rate_error
         )
-    finite = np.isfinite(angle)
-    t, y = time[finite], angle[finite]
+    known = np.isfinite(angle)
+    t, y = time[known], angle[known]
     if len(t) < 3 or t[-1] == t[0]:
         return SecularLine(float(y.mean()) if len(y) else 0.0, 0.0, 0.0, False)
     middle = (t[0] + t[-1]) / 2
@@ -93,7 +94,8 @@ def _analysis_of(time: bytes, angle: bytes) -> SignalAnalysis | None:
         return None
 
 
-def circulation(time: Array, plane: Array) -> SecularLine | None:
+@optional
+def circulation(time: Array, plane: Array) -> SecularLine:
     """The mean motion of a point of a plane (rows, 2) about the origin; counterclockwise > 0. Its error is
     what a narrower window makes of it.
 
@@ -101,22 +103,15 @@ def circulation(time: Array, plane: Array) -> SecularLine | None:
     sampled too sparsely to decide.
     """
     finite = np.isfinite(plane).all(axis=1)
-    phase = np.arctan2(plane[finite, 1], plane[finite, 0])
-    steps = np.diff(phase)
-    steps -= _TURN * np.round(steps / _TURN)
-    if len(steps) < 4 or np.abs(steps).max() > 0.9 * np.pi:
-        return None
-    angle = phase[0] + np.concatenate([[0.0], np.cumsum(steps)])
-    if abs(angle[-1] - angle[0]) < 0.95 * _TURN:
-        return None
-    time, half = time[finite], len(angle) // 2
+    time, angle = time[finite], np.unwrap(np.arctan2(plane[finite, 1], plane[finite, 0]))
+    need(len(angle) > 4 and np.abs(np.diff(angle)).max() <= 0.9 * np.pi)
+    need(abs(angle[-1] - angle[0]) >= 0.95 * _TURN)
+    half = len(angle) // 2
     rates = [_mean_rate(time[part], angle[part]) for part in (slice(half), slice(half, None))]
-    if abs(rates[0] - rates[1]) > _UNIFORM * max(map(abs, rates)):
-        return None
+    need(abs(rates[0] - rates[1]) <= _UNIFORM * max(map(abs, rates)))
     rate, narrower = _mean_rate(time, angle), _mean_rate(time, angle, 2.0)
-    middle = (time[0] + time[-1]) / 2
-    value = float(np.mean(angle - rate * (time - middle)))
-    return SecularLine(value, rate, float(middle), True, abs(rate - narrower)) if rate else None
+    need(rate != 0)
+    return SecularLine(0.0, rate, 0.0, True, abs(rate - narrower))
 
 
 def _mean_rate(time: Array, angle: Array, power: float = 1.0) -> float:
@@ -128,51 +123,29 @@ def _mean_rate(time: Array, angle: Array, power: float = 1.0) -> float:
     return float(weight @ np.diff(angle) / (weight @ np.diff(time)))
 
 
-@dataclass(frozen=True)
-class FittedEllipse:
-    """``across cos(w t) ...``: complex amplitudes of both coordinates of a point, and w > 0, rad/s."""
-
-    across: complex
-    up: complex
-    rate: float
-
-    @property
-    def semi_axes(self) -> tuple[float, float]:
-        """The larger and the smaller semi-axis."""
-        a, b = abs(self.across + 1j * self.up) / 2, abs(self.across - 1j * self.up) / 2
-        return a + b, abs(a - b)
-
-    def curve(self, points: int = 181) -> Array:
-        """Points once around it, (points, 2)."""
-        phase = np.exp(1j * np.linspace(0.0, _TURN, points))
-        return np.stack([(self.across * phase).real, (self.up * phase).real], axis=1)
-
-
-def leading_ellipse(time: Array, longitude: Array, latitude: Array, shortened: float) -> FittedEllipse | None:
+@optional
+def leading_ellipse(
+    time: Array, longitude: Array, latitude: Array, shortened: float
+) -> tuple[Array, tuple[float, float], float]:
     """The strongest line of a pole's longitude, `shortened` by the sine of its obliquity, and latitude
-    together (rows,), rad; None if neither has a line of 1.5 periods in the run, or they can't be analysed.
+    together (rows,), rad: points (181, 2) of the ellipse, its semi-axes, and its rate, rad/s. None if neither
+    has a line of 1.5 periods in the run, or they can't be analysed.
     """
-    found = [_analysed(time, angle) for angle in (longitude, latitude)]
-    if found[0] is None or found[1] is None:
-        return None
+    found = [(need(_analysed(time, longitude)), shortened), (need(_analysed(time, latitude)), 1.0)]
     span = abs(time[-1] - time[0])
-    lines = [
-        (scale * float(line.amplitude), line)
-        for signal, scale in zip(found, (shortened, 1.0), strict=True)
-        if signal is not None
+    sizes = {
+        float(line.frequency): scale * float(line.amplitude)
+        for signal, scale in found
         for line in signal.lines
         if float(line.frequency) * span > _LEAST_CYCLES * _TURN
-    ]
-    if not lines:
-        return None
-    rate = float(max(lines, key=lambda one: one[0])[1].frequency)
-
-    def part(signal: SignalAnalysis) -> complex:
-        near = [x for x in signal.lines if abs(float(x.frequency) - rate) * span < _TURN / 2]
-        return sum((_complex(x) for x in near[:1]), 0j)
-
-    return FittedEllipse(shortened * part(found[0]), part(found[1]), rate)
-
-
-def _complex(line: SpectralLine) -> complex:
-    return complex(float(line.amplitude) * np.exp(1j * float(line.phase)))
+    }
+    need(bool(sizes))
+    rate, amplitudes = max(sizes, key=lambda one: sizes[one]), []
+    for signal, scale in found:
+        near = (x for x in signal.lines if abs(float(x.frequency) - rate) * span < _TURN / 2)
+        line = next(near, None)
+        amplitudes.append(scale * float(line.amplitude) * np.exp(1j * float(line.phase)) if line else 0j)
+    across, up = amplitudes
+    a, b = abs(across + 1j * up) / 2, abs(across - 1j * up) / 2
+    turn = np.exp(1j * np.linspace(0.0, _TURN, 181))
+    return np.stack([(across * turn).real, (up * turn).real], axis=1), (a + b, abs(a - b)), rate

@@ -144,9 +144,10 @@ def nutation(dataset: xarray.Dataset) -> Path:
     need(0 < np.nanmax(signals.norms(path)) < _FAR)
     ellipse, drawn = fits.leading_ellipse(seconds, node, tilt, float(np.sin(mean))), None
     if ellipse is not None:
-        long, short = (angle_text(size, 3) for size in ellipse.semi_axes)
-        words = f"{period_text(_TURN / ellipse.rate, dataset.attrs)}: semi-axes {long}, {short}"
-        drawn = ellipse.curve() / scaled(path, "rad")[0], words
+        points, axes, rate = ellipse
+        long, short = (angle_text(size, 3) for size in axes)
+        words = f"{period_text(_TURN / rate, dataset.attrs)}: semi-axes {long}, {short}"
+        drawn = points / scaled(path, "rad")[0], words
     title, labels = "Nutation: the pole about its mean motion", ("Δlongitude · sin(obliquity)", "Δobliquity")
     return planar("nutation", title, path, *labels, ellipse=drawn)
 

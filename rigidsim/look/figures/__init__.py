@@ -6,8 +6,7 @@ panels: what is found in a dataset (a `Plot`, a `Path`, or a function that draws
 
 | module | holds |
 | --- | --- |
-| `catalogue` | all figures by name, composed of panels to a page, or one of them on a slide |
-| `panels` | curves, paths and what only paper shows as matplotlib draws them |
+| `catalogue` | all figures by name: panels, composed to a page, or one of them on a slide |
 | `surfaces` | polhode, Poinsot's motion, the momentum's sphere of a body with rotors |
 | `style` | colours, fonts, the page's heading, keys |
 | `spectrum`, `work_precision`, `sweeps` | figures of `analyse`, `tradeoff` and `sweep` |
