@@ -62,9 +62,9 @@ from rigidsim.scene.choices import (
     variables_named,
 )
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.integrator_table import LARGEST_DIGITS
 from rigidsim.scene.readable import span_text
 from rigidsim.scene.scene import build_scene
+from rigidsim.scene.schema import LARGEST_DIGITS
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.problem import InitialValueProblem, prepare, prepare_scene

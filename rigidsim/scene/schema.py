@@ -19,14 +19,15 @@ from pydantic import (
     StrictInt,
     StrictStr,
     ValidationInfo,
+    WithJsonSchema,
     create_model,
     field_validator,
     model_validator,
 )
 
 from rigidsim.scene.bodies.table import Body
-from rigidsim.scene.choices import DEFAULT_METHOD, REDUCED
-from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.choices import AUTO, DEFAULT_METHOD, FORMULATIONS, METHODS, REDUCED
+from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.expressions.names import BODY_NAMES
 from rigidsim.scene.expressions.tree import RESERVED
 from rigidsim.scene.fields import (
@@ -37,6 +38,7 @@ from rigidsim.scene.fields import (
     Dimensionless,
     EachOnce,
     ElementLines,
+    EulerSequence,
     Four,
     Irradiance,
     Metre,
@@ -53,18 +55,17 @@ from rigidsim.scene.fields import (
     VariableName,
     excludes,
     named,
+    number_schema,
     refuse,
 )
-from rigidsim.scene.fit_table import FitTable
 from rigidsim.scene.frame import Frame
-from rigidsim.scene.integrator_table import Integrator
 from rigidsim.scene.kernels.ephemeris import EphemerisTable
 from rigidsim.scene.own_states import OwnStateTable
 from rigidsim.scene.point_masses import PointMassBody
 from rigidsim.scene.registry import LOADS, OBSERVABLES, LoadFields
 from rigidsim.scene.rotors import RotorTable
 from rigidsim.scene.sample_times import Time
-from rigidsim.scene.sweep_table import SweepTable
+from rigidsim.scene.validation_messages import shown
 
 _FOLDER_NAME = "^[A-Za-z0-9._-]{1,100}$"
 _ABOUT_NAME = (
@@ -274,6 +275,273 @@ class TableText(ConfigTable):
 
     text: StrictStr
     """text of the CSV file, or of the gravity field"""
+
+
+# A number is carried and stored as a sum of float64 parts, which end at 2^-1074: 250 digits (833 bits) leave
+# room for numbers down to 1e-70.
+LARGEST_DIGITS = 250
+_BELOW_HALF_A_TURN = Range(lambda x: 0 < x < 3, "an angle above 0 and below pi, in rad,")
+PRECISION_NAMES = ("single", "double", "extended", "quadruple")
+
+
+class Integrator(ConfigTable):
+    """``[integrator]``: how accurately, and in which variables."""
+
+    precision: (
+        Literal["single", "double", "extended", "quadruple"]
+        | Annotated[StrictInt, WithJsonSchema({"type": "integer", "minimum": 1, "maximum": LARGEST_DIGITS})]
+    ) = Field("double", examples=["extended", 50])
+    """precision of the arithmetic: single, double, extended or quadruple (24, 53, 64 or 113 bits), or a
+    number of decimal digits
+    """
+    tolerance: Literal["auto"] | Dimensionless = Field(
+        "auto", examples=["auto", 1e-12], json_schema_extra={"x-above": 0, "x-at-most": 1}
+    )
+    """error tolerance of each step, relative to the largest component of the state; auto is epsilon in double
+    precision, and an eighth of it in most others, where epsilon would truncate the series slightly too early
+    """
+    formulation: Annotated[str, OneOf(FORMULATIONS, (AUTO,))] = Field(
+        AUTO,
+        description="the variables that are integrated; "
+        + "; ".join(f"{name}: {known.described}" for name, known in FORMULATIONS.items() if known.described),
+    )
+    euler_sequence: EulerSequence = "zxz"
+    """axes of the intrinsic rotations, for [initial] and for recorded angles"""
+    method: Annotated[str, OneOf(METHODS)] = Field(
+        DEFAULT_METHOD, description="; ".join(f"{x.name}: {x.described}" for x in METHODS.values())
+    )
+    hold_invariants: StrictBool | Literal["auto"] = "auto"
+    """project the state onto its invariants, so that errors of long runs grow far more slowly; auto: from
+    step 8192 on, leaving shorter runs unchanged; in sweeps auto means false
+    """
+    accuracy: Annotated[Angle, _BELOW_HALF_A_TURN] | None = Field(
+        None, examples=[1e-9], json_schema_extra={"x-above": 0, "x-below": 3}
+    )
+    """attitude error allowed at the end, instead of precision and tolerance; certified"""
+    # version 1.0 promises that the schema shows no unit here
+    accuracy_axis: Annotated[Angle, _BELOW_HALF_A_TURN, WithJsonSchema(number_schema("1"))] | None = Field(
+        None, examples=[1e-6]
+    )
+    """error (rad) allowed until the end in the directions of the angular momentum and the figure axis; with
+    [model] level = "auto" the cheapest model within it is chosen
+    """
+    accuracy_position: Positive[Metre] | None = Field(
+        None, examples=["1 um"], json_schema_extra={"x-above": 0}
+    )
+    """position error allowed at the end if the body flies; certified"""
+
+    @property
+    def has_steps(self) -> bool:
+        """Whether the method integrates in steps; a closed form takes none."""
+        return METHODS[self.method].has_steps
+
+    @field_validator("hold_invariants", mode="before")
+    @classmethod
+    def _whether_to_hold(cls, value: Any) -> Any:
+        if isinstance(value, bool) or value == "auto":
+            return value
+        raise refuse(f'given {shown(value)}; true, false or "auto" is allowed')
+
+    @field_validator("precision", mode="before")
+    @classmethod
+    def _known_precision(cls, value: Any) -> Any:
+        whole = isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= LARGEST_DIGITS
+        if whole or (isinstance(value, str) and value in PRECISION_NAMES):
+            return value
+        raise refuse(
+            f"given {shown(value)}; allowed: {', '.join(PRECISION_NAMES)}, "
+            f"or a number of decimal digits from 1 to {LARGEST_DIGITS}"
+        )
+
+    @field_validator("tolerance", mode="before")
+    @classmethod
+    def _positive_tolerance(cls, value: Any) -> Any:
+        if value == "auto":
+            return value
+        try:
+            number = parse_number(value, "1")
+        except ValueError as error:
+            raise refuse(f'{error}; or "auto"') from None
+        if not (number.sign > 0 and float(number) <= 1):
+            raise refuse(f'given {shown(value)}; allowed: above 0 and at most 1, or "auto"')
+        return number
+
+
+KEPT = (
+    "final", "extremes", "means", "events", "section", "megno", "fli", "lyapunov", "frequencies", "series",
+)  # fmt: skip
+"""Items that can be kept of a member; drifts, steps and warnings always are."""
+INDICATORS = ("megno", "fli", "lyapunov")
+"""Items that need a tangent vector's growth, which is recorded for them."""
+RANDOM = ("normal", "uniform", "sphere")
+WAYS = ("linspace", "logspace", "step", "values", *RANDOM)
+"""Ways to give an axis's values."""
+LARGEST_AXIS = 10_000_000
+LARGEST_TILE = 100_000_000
+MOST_EVENTS = 100_000
+
+
+class AxisTable(ConfigTable):
+    """One axis: the values that a key takes, said in one of seven ways."""
+
+    linspace: Triple[Any] | None = None
+    """[from, to, count], both ends included"""
+    logspace: Triple[Any] | None = None
+    """[from, to, count], with equal ratios, both ends included"""
+    step: Triple[Any] | None = None
+    """[from, step, count], equally spaced"""
+    values: list[Any] | None = Field(None, min_length=1)
+    """list of values, each as the key itself accepts it"""
+    normal: Pair[Any] | None = None
+    """[mean, standard deviation]; with count"""
+    uniform: Pair[Any] | None = None
+    """[from, to]; with count"""
+    sphere: Any = None
+    """radius: random directions of a vector with count, or a grid of directions with grid"""
+    count: StrictInt | None = Field(None, ge=1)
+    """number of random values"""
+    grid: Pair[StrictInt] | None = None
+    """for sphere: numbers of polar angles (equally spaced in their cosine) and azimuths"""
+    name: StrictStr | None = None
+    """name of the dimension; by default the last part of the key, or the whole key where the last part is the
+    name of something recorded
+    """
+
+    @model_validator(mode="after")
+    def _one_way(self) -> AxisTable:
+        way = self.way
+        if way == "sphere" and (self.count is None) == (self.grid is None):
+            raise refuse(
+                "a sphere takes either count (random directions) or grid (polar angles and azimuths), "
+                "such as grid = [16, 32]"
+            )
+        if way in ("normal", "uniform") and self.count is None:
+            raise refuse(f"{way} needs a count, such as count = 100")
+        if way not in RANDOM and self.count is not None:
+            raise refuse(f"count is for random values ({', '.join(RANDOM)}); {way} says it itself")
+        if way != "sphere" and self.grid is not None:
+            raise refuse("grid is for sphere alone")
+        return self
+
+    @field_validator("grid")
+    @classmethod
+    def _possible_grid(cls, value: list[int] | None) -> list[int] | None:
+        if value is not None and min(value) < 1:
+            raise refuse(f"given {shown(value)}; two whole numbers of at least 1 are allowed")
+        return value
+
+    @property
+    def way(self) -> str:
+        """Which of the ways the axis uses."""
+        return next(way for way in WAYS if getattr(self, way) is not None)
+
+
+class SweepTable(ConfigTable):
+    """``[sweep]``: many members of one experiment."""
+
+    mode: Literal["product", "zip"] = "product"
+    """product: every combination of the axes' values; zip: the first of each, the second, ..."""
+    seed: StrictInt = 0
+    """seed of random values; each draw depends on seed, key and index"""
+    keep: EachOnce[Annotated[str, OneOf(KEPT)]] = Field(["final"])
+    """results kept of each member, besides drifts, steps and warnings"""
+    most_events: StrictInt = Field(16, ge=1, le=MOST_EVENTS)
+    """largest number of times (events) or points (section) kept of an event"""
+    tile: StrictInt | None = Field(None, ge=1, le=LARGEST_TILE)
+    """number of members computed and saved together; by default some seconds of work"""
+    batch: StrictBool = True
+    """integrate members that share their equations side by side; false: each by itself, which takes many
+    times as long
+    """
+    impossible: Literal["refuse", "mark"] = "refuse"
+    """members that can't be run: refuse the sweep before any of them runs, or mark those as "refused", with
+    the reason, and run the others
+    """
+    axes: dict[StrictStr, AxisTable] = Field(min_length=1)
+    """the axes, by the dotted keys whose values are swept, with indices from 0"""
+
+
+MOST_STARTS = 10_000
+_ONE_OR_MORE = Range(lambda x: x >= 1, "1 or more")
+
+
+class KnownWithin(ConfigTable):
+    """How well a value is known besides the data."""
+
+    sigma: Any = Field(examples=[0.1, "1e10 m^3/s^2", [0.1, 0.1, 0.2]])
+    """standard deviation about the config's value, in the unit of the key; of a vector one for all its
+    components, or one for each
+    """
+
+    @field_validator("sigma")
+    @classmethod
+    def _number(cls, value: Any) -> Any:
+        if isinstance(value, bool | dict) or value is None:
+            raise refuse(f"given {shown(value)}; a standard deviation, or one for each component, is allowed")
+        return value
+
+
+class FitDataTable(ConfigTable):
+    """``[[fit.data]]``: one set of observations, at its own times."""
+
+    file: StrictStr = Field(examples=["observed.csv"])
+    """CSV, Parquet, netCDF, AEM, OEM, CK, or the dataset of a run; its path from the config's folder"""
+    kernels: EachOnce[StrictStr] = Field(default_factory=list, examples=[["clock.tsc", "leapseconds.tls"]])
+    """of a CK: the clock (SCLK) and what else SPICE reads it with; paths from the config's folder"""
+    time: StrictStr = Field("time", examples=["time", "utc"])
+    """column of the times: seconds of the run, or dates"""
+    observable: StrictStr = Field(examples=["quaternion", "angular_velocity", "wz^2"])
+    """any variable that can be recorded, or an expression as in [[events]]"""
+    columns: EachOnce[StrictStr] | None = Field(None, examples=[["alpha_deg", "beta_deg", "gamma_deg"]])
+    """columns of its components; by default NAME_COMPONENT as in exported tables, or NAME for a single one"""
+    unit: StrictStr | None = Field(None, examples=["deg"])
+    """unit of these columns; by default the file's, or SI"""
+    sigma: Any = Field(examples=["5 deg", "sigma_deg", 1e-3])
+    """standard deviation of each component: a number with its unit (bare ones are SI), or the name of a
+    column, in ``unit``; of attitudes, of each component of a rotation vector
+    """
+    scale: Literal["TDB", "TT", "TAI", "GPS", "UTC"] = "UTC"
+    """time scale of dates that don't name theirs"""
+    outliers: Annotated[Dimensionless, _ONE_OR_MORE] | None = Field(None, examples=[4])
+    """leave out and report rows with a residual above so many standard deviations; by default none"""
+
+    @field_validator("sigma")
+    @classmethod
+    def _sigma(cls, value: Any) -> Any:
+        if isinstance(value, bool | dict | list) or value is None:
+            raise refuse(f"given {shown(value)}; a standard deviation, or the name of a column, is allowed")
+        return value
+
+
+class FitTable(ConfigTable):
+    """``[fit]``: what ``rigidsim fit`` estimates."""
+
+    parameters: EachOnce[StrictStr] = Field(
+        min_length=1, examples=[["initial.attitude", "initial.angular_velocity", "body.principal_moments[0]"]]
+    )
+    """dotted keys with indices from 0 whose values are estimated, in this order everywhere; initial.attitude
+    is a rotation vector in body axes from the config's attitude; the config's values are where it starts
+    """
+    prior: dict[StrictStr, KnownWithin] = Field(default_factory=dict)
+    """by key: how well a parameter is known beforehand"""
+    consider: dict[StrictStr, KnownWithin] = Field(default_factory=dict)
+    """by key: how uncertain values are that are not estimated; it counts in the sigmas of those that are"""
+    data: list[FitDataTable] = Field(min_length=1)
+    """the observations"""
+    starts: StrictInt = Field(1, ge=1, le=MOST_STARTS)
+    """number of starts: the config's values, and others drawn from the priors; the best end is taken"""
+
+    @model_validator(mode="after")
+    def _either(self) -> FitTable:
+        both = sorted(set(self.parameters) & set(self.consider))
+        if both:
+            raise refuse(f'"{both[0]}" is both estimated and considered; remove it from one of them')
+        if self.starts > 1 and not self.prior:
+            raise refuse(
+                f"starts = {self.starts}, but without a prior there is nothing to draw them from; add "
+                'prior."KEY" = {sigma = ...}'
+            )
+        return self
 
 
 class Config(ConfigTable):

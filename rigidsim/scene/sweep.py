@@ -24,8 +24,7 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber, fraction_of, parse_number
 from rigidsim.scene.paths import Path, leaves
 from rigidsim.scene.registry import OBSERVABLES
-from rigidsim.scene.schema import config_model
-from rigidsim.scene.sweep_table import INDICATORS, LARGEST_AXIS, AxisTable, SweepTable
+from rigidsim.scene.schema import INDICATORS, LARGEST_AXIS, AxisTable, SweepTable, config_model
 from rigidsim.scene.toml_text import inline, parse_toml
 from rigidsim.scene.validation_messages import nearest, shown
 

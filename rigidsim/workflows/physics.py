@@ -26,10 +26,9 @@ from rigidsim.errors import FORCE, OUT, ConfigError, Problem, Remedy, RunFolderE
 from rigidsim.model.load import loads_of
 from rigidsim.scene.choices import FULL, REDUCED
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.exact import parse_number
 from rigidsim.scene.readable import span_text
-from rigidsim.scene.registry import LOADS, names_of
+from rigidsim.scene.registry import LOADS, EffectPart, names_of
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.swept import plain

@@ -24,8 +24,7 @@ from rigidsim.accuracy.estimates.estimate import (
     UNCERTAIN,
     plain_perturbations,
 )
-from rigidsim.solve.batch.family import Family
-from rigidsim.solve.batch.run import BatchBlock
+from rigidsim.solve.batch.family import BatchBlock, Family
 from rigidsim.solve.error_tangents import (
     SHORTEST,
     TANGENTS,

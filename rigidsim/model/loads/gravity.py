@@ -78,7 +78,6 @@ from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, across, cross, dot, norm, parallel, unit_vectors
 from rigidsim.scene.bodies.gravity_field import LEAST, MOST, GravityField, HarmonicsTable
 from rigidsim.scene.cautions import Caution, WarningCode
-from rigidsim.scene.effect_parts import EffectPart, degree_parts
 from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.exact import ZERO, ExactNumber, parse_number
 from rigidsim.scene.fields import (
@@ -111,7 +110,15 @@ from rigidsim.scene.orbits import (
 )
 from rigidsim.scene.point_masses import PointMasses
 from rigidsim.scene.readable import length_text
-from rigidsim.scene.registry import LoadFields, SceneLoad, Setting, SourceFields, register_load
+from rigidsim.scene.registry import (
+    EffectPart,
+    LoadFields,
+    SceneLoad,
+    Setting,
+    SourceFields,
+    degree_parts,
+    register_load,
+)
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.space_axes import ECLIPTIC, obliquity, to_ecliptic
 from rigidsim.scene.swept import plain

@@ -50,12 +50,11 @@ from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.arithmetic import Matrix, Vector, apply, cross, dot, norm, unit_vectors
 from rigidsim.scene.bodies.body import RigidBody
 from rigidsim.scene.cautions import Caution, WarningCode
-from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.expressions.names import NameProvider, Readable, provides
 from rigidsim.scene.expressions.tree import Expression, states_read
 from rigidsim.scene.frame import unique_axis
 from rigidsim.scene.readable import value_text
-from rigidsim.scene.registry import Setting, register_load
+from rigidsim.scene.registry import EffectPart, Setting, register_load
 from rigidsim.scene.rotors import RotorTable
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config

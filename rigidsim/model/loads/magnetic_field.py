@@ -27,7 +27,6 @@ from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, norm, transpose, unit_vectors
 from rigidsim.scene.bodies.presets import EARTH
 from rigidsim.scene.earth_axes import earth_axes, rotation_rate
-from rigidsim.scene.effect_parts import EffectPart, degree_parts
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import PLACES, NameProvider, Readable, provides
@@ -50,7 +49,7 @@ from rigidsim.scene.fields import (
 from rigidsim.scene.geomagnetic_field import MOST, RADIUS, igrf
 from rigidsim.scene.orbits import OrbitFields, resolve_orbit
 from rigidsim.scene.readable import length_text, value_text
-from rigidsim.scene.registry import Setting, register_load
+from rigidsim.scene.registry import EffectPart, Setting, degree_parts, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.swept import plain

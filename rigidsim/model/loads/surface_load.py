@@ -53,7 +53,6 @@ from rigidsim.scene.bodies.outside import OuterSurface, Plate
 from rigidsim.scene.bodies.presets import EARTH, known_body
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.earth_axes import earth_axes, rotation_rate
-from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import PLACES, NameProvider, Readable, provides
 from rigidsim.scene.expressions.tree import Expression, evaluate, names_used, states_read
@@ -71,7 +70,7 @@ from rigidsim.scene.fields import (
 from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.point_masses import kepler_reach
 from rigidsim.scene.readable import length_text, value_text
-from rigidsim.scene.registry import LoadFields, Setting, register_load
+from rigidsim.scene.registry import EffectPart, LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.swept import plain

@@ -1,12 +1,19 @@
-"""Members of a sweep as the batch engine sees them, and families of those that share their equations.
+"""Members of a sweep as the batch engine sees them, families of those that share their equations, and their
+runs from the start to the last sample, with everything that is recorded of them.
 
 A family's system is built once with the numbers of all its members (``rigidsim.scene.swept``), for whom a
 coefficient that depends on what is swept is a parameter.
+
+As in a single run an event's expression is given a unit in which it is of order one, and is taken off a zero
+that the motion begins at (``rigidsim.solve.events``). Both depend on the member, so that they are parameters.
+Tangent vectors have an integrator and functions apart: compiled with them, the motion might be rounded
+otherwise.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property, lru_cache, partial
@@ -21,6 +28,7 @@ from rigidsim.model.model_plan import plan_model
 from rigidsim.model.names import TANGENT
 from rigidsim.model.scaling import EstimatedEffect
 from rigidsim.model.system import System
+from rigidsim.model.tangents import GROWTH
 from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.choices import DEFAULT_METHOD, FULL, variables_named
 from rigidsim.scene.config import Experiment
@@ -30,9 +38,14 @@ from rigidsim.scene.paths import Path
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.scene.sweep import Sweep
 from rigidsim.scene.swept import Swept, SweptContext, SweptExact, Untraceable
+from rigidsim.solve.compiled import compiled_function, evaluate_rows
 from rigidsim.solve.effects.effect import registered_effects
+from rigidsim.solve.events import BESIDE, STATES, TIMES, exponents_of
+from rigidsim.solve.lanes import BatchEngine, LaneResults, recommended_width
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, prepare
+from rigidsim.solve.sampling import SampleClock
+from rigidsim.solve.status import Status
 
 _HELD = 1 << 16  # values of axes that are held, each worked out once for all members that share it
 _AT_ONCE = 4096  # members whose numbers are worked out together
@@ -338,3 +351,331 @@ class Families:
         scene = build_scene(replace(experiment, config=config), context)
         check_start(scene)
         return Family(prepared, scene, plan, candidates)
+
+
+# --- from the start to the last sample ----------------------------------------------------------------------
+
+Values = dict[str, np.ndarray]
+
+_VALUES_AT_ONCE = 2_000_000
+"""Sample values evaluated together; more would take memory that has to be fetched anew for each operation."""
+_MOST_STEPS = 10_000
+_STEPS_PER_UNIT = 200.0
+"""A natural step is of the order of one internal unit of time. A lane that takes so many more is given up
+here, before it holds the others any longer, and run by itself.
+"""
+
+
+@dataclass(frozen=True)
+class BatchEvents:
+    """Crossings of one event in a block, in the order of members and time (n,)."""
+
+    name: str
+    member: np.ndarray  # places in the block
+    time: np.ndarray  # seconds
+    values: Values  # recorded variables, (n, components), SI
+
+
+@dataclass(frozen=True)
+class BatchBlock:
+    """Results of some members of a family; m members and their samples."""
+
+    members: np.ndarray  # indices in the sweep
+    places: np.ndarray  # in the numbers from which they were run
+    times: np.ndarray  # (samples,), seconds
+    start: np.ndarray  # (m,), each member's internal unit of time
+    moments: np.ndarray  # (samples, m), likewise
+    states: np.ndarray  # of the motion, (samples, states, m), internal units
+    values: Values  # recorded variables, (samples, m, components), SI; NaN from where a member ended
+    drifts: Values  # relative drifts by the names of the invariants, (samples, m)
+    status: np.ndarray  # (m,) objects; None where a lane gave up and the member is to be run by itself
+    reached: np.ndarray  # number of samples, (m,)
+    steps: np.ndarray
+    drift_bound: np.ndarray  # relative drift that rounding alone explains, (m,)
+    events: list[BatchEvents]
+    width: int  # lanes of the integrator, on which the last bits depend
+
+    def largest_drifts(self) -> np.ndarray:
+        """Magnitude of each sample's worst drift, (samples, m); infinite where one has no finite value, and 0
+        where no sample was taken.
+        """
+        worst = np.zeros(self.moments.shape)
+        for drift in self.drifts.values():
+            worst = np.maximum(worst, np.where(np.isfinite(drift), np.abs(drift), np.inf))
+        return np.where(np.arange(len(worst))[:, None] < self.reached, worst, 0.0)
+
+
+class BatchRun:
+    """Runs a family's members; by default with the processor's own width."""
+
+    def __init__(self, family: Family, width: int | None = None) -> None:
+        self.width = width or recommended_width()
+        self._family, self._system = family, family.system
+        self._clocks: dict[int, SampleClock] = {}
+        system = self._system
+        self._crossings = [hy.expression(c.expression) for c in system.crossings]
+        self._components = [x for invariant in system.invariants for x in invariant.expressions]
+        grown = {r.first for r in system.recorded if r.name == GROWTH}
+        self._of_tangents = np.array([row in grown for row in range(len(system.outputs))])
+        pairs = list(zip(system.outputs, self._of_tangents, strict=True))
+        self._of_motion = [x for x, of_tangents in pairs if not of_tangents]
+        self._growth = [x for x, of_tangents in pairs if of_tangents]
+
+    def compile(self) -> None:
+        """Compile integrators and functions now rather than when the first members need them."""
+        _ = self._plain, self._along
+        if self._components:
+            self._compiled(self._components)
+        self._compiled(self._of_motion)
+        if self._growth:
+            self._compiled(self._growth, along=True)
+
+    def blocks(self) -> Iterator[BatchBlock]:
+        """Run the members, as many at a time as fit into memory."""
+        samples = self._family.prepared.clock.count
+        each = samples * (len(self._system.states) + len(self._system.outputs))
+        most = max(_VALUES_AT_ONCE // each // self.width, 1) * self.width
+        # members with about as many steps run side by side, so that none waits for long
+        order = np.argsort(self._family.doubles(self._system.rate_bound), kind="stable")
+        for first in range(0, len(order), most):
+            yield self._block(order[first : first + most])
+
+    def _block(self, part: np.ndarray) -> BatchBlock:
+        family = self._family
+        initial, swept = family.initial[:, part], family.parameters[:, part]
+        moving, read = initial[: self._family.moving], swept[self._family.in_equations]
+        start, times = self._times(family.whole_numbers(self._system.scaling.time)[part])
+        most = self._most_steps(start, times)
+        parameters = np.concatenate([read, self._of_events(moving, swept, start, times[-1])])
+        lanes, along = self._plain.run(moving, parameters, start, times, most), None
+        if self._along is not None:
+            along = self._along.run(initial, read, start, times, most).states
+        begun = self._evaluated(self._components, moving[None], swept, start[None])[:, 0]
+        found = self._outputs(lanes.states, swept, times, begun, along)
+        values, first = self._in_si(found, part), len(found) - len(self._system.invariants)
+        self._join(values, part)
+        drifts = {f"{one.name}_drift": found[first + n] for n, one in enumerate(self._system.invariants)}
+        block = BatchBlock(
+            family.members[part],
+            part,
+            self._family.prepared.clock.labels(0, len(times)),
+            start,
+            times,
+            lanes.states,
+            values,
+            drifts,
+            self._status(lanes, most),
+            _reached(lanes),
+            lanes.steps,
+            self._family.prepared.drift_bound(lanes.steps),
+            self._events(lanes, swept, part, begun),
+            self.width,
+        )
+        self._ended_by_events(block)
+        self._ended_by_drift(block)
+        return block
+
+    # --- integrators ------------------------------------------------------------------------------------
+
+    def _engine(self, states: int, events: Sequence[tuple[Any, int]] = ()) -> BatchEngine:
+        """Batch integrator of the first states of the system."""
+        system, tolerance = self._system, self._family.prepared.tolerance
+        rights = self._family.as_parameters([right for _, right in system.equations[:states]])
+        equations = list(zip(system.variables[:states], rights, strict=True))
+        loose = None if tolerance is None else float(tolerance)
+        return BatchEngine(equations, self.width, events=events, tolerance=loose, compact=system.wide)
+
+    @cached_property
+    def _plain(self) -> BatchEngine:
+        """The motion; each event has a shift and a factor as parameters after the equations' own."""
+        expressions, first = self._family.as_parameters(self._crossings), len(self._family.in_equations)
+        events = [
+            ((expression + hy.par[first + 2 * n]) * hy.par[first + 2 * n + 1], crossing.direction)
+            for n, (expression, crossing) in enumerate(zip(expressions, self._system.crossings, strict=True))
+        ]
+        return self._engine(self._family.moving, events)
+
+    @cached_property
+    def _along(self) -> BatchEngine | None:
+        states = len(self._system.states)
+        return self._engine(states) if states > self._family.moving else None
+
+    def _of_events(
+        self, initial: np.ndarray, swept: np.ndarray, start: np.ndarray, end: np.ndarray
+    ) -> np.ndarray:
+        """Parameters (2 * events, members) of the events' expressions."""
+        found = np.zeros((2 * len(self._crossings), len(start)))
+        if not self._crossings:
+            return found
+        random = np.random.default_rng(0).uniform(-1.0, 1.0, (STATES, len(initial)))
+        states = np.repeat(random[:, :, None], len(start), axis=2)
+        states[0] = initial
+        largest: np.ndarray = np.zeros((len(self._crossings), len(start)))
+        with np.errstate(all="ignore"):
+            at_start = self._evaluated(self._crossings, initial[None], swept, start[None])[:, 0]
+            for part in TIMES:
+                times = np.broadcast_to(start + part * (end - start), (STATES, len(start)))
+                values = self._evaluated(self._crossings, states, swept, times)
+                values = np.where(np.isfinite(values), np.abs(values), 0.0)
+                largest = np.fmax(largest, values.max(axis=1))
+        found[0::2] = np.where(at_start == 0, 2.0 ** (-_DOUBLE.bits - BESIDE), 0.0)
+        found[1::2] = np.ldexp(1.0, -exponents_of(largest))
+        return found
+
+    def _times(self, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Start (m,) and samples (samples, m) in each member's internal unit of time."""
+        start, columns = np.empty(len(units)), np.empty((self._family.prepared.clock.count, len(units)))
+        for unit in np.unique(units).tolist():
+            if unit not in self._clocks:
+                scaling = replace(self._system.scaling, time=unit)
+                self._clocks[unit] = SampleClock(self._system.scene.samples, _DOUBLE, scaling)
+            clock, same = self._clocks[unit], units == unit
+            start[same] = clock.start
+            columns[:, same] = clock.internal(0, clock.count)[:, None]
+        return start, columns
+
+    def _most_steps(self, start: np.ndarray, times: np.ndarray) -> int:
+        asked = self._family.prepared.scene.config.limits.max_steps
+        longest = float((times[-1] - start).max())
+        given_up = _MOST_STEPS + int(min(_STEPS_PER_UNIT * longest, 1e12))
+        return given_up if asked is None else min(int(asked), given_up)
+
+    def _status(self, lanes: LaneResults, most: int) -> np.ndarray:
+        asked = self._family.prepared.scene.config.limits.max_steps
+        short = Status.MAX_STEPS if asked is not None and most == int(asked) else None
+        found = np.full(len(lanes.arrived), Status.FINISHED, dtype=object)
+        found[~lanes.arrived] = short
+        found[~lanes.arrived & ~lanes.finite] = Status.NON_FINITE
+        return found
+
+    # --- events and guards ----------------------------------------------------------------------------------
+
+    def _events(
+        self, lanes: LaneResults, swept: np.ndarray, part: np.ndarray, begun: np.ndarray
+    ) -> list[BatchEvents]:
+        events, scaling = [], self._system.scaling
+        for index, crossing in enumerate(self._system.crossings):
+            rows = [(m, f) for m, found in lanes.found.items() for f in found if f.event == index]
+            rows.sort(key=lambda row: (row[0], row[1].time))
+            place, times = np.array([m for m, _ in rows], dtype=np.int64), np.array([f.time for _, f in rows])
+            states = np.array([f.state for _, f in rows]).reshape(len(rows), lanes.states.shape[1])
+            at = self._outputs(states.T[None], swept[:, place], times[None], begun[:, place])
+            values = {name: x[0] for name, x in self._in_si(at, part[place]).items()}
+            units = self._family.whole_numbers(scaling.time)[part[place]]
+            events.append(
+                BatchEvents(crossing.name, place, scaling.direction * np.ldexp(times, units), values)
+            )
+        return events
+
+    def _ended_by_events(self, block: BatchBlock) -> None:
+        """End motions at the first crossing that stops them; later samples and crossings are dropped."""
+        stops = [e for e, c in zip(block.events, self._system.crossings, strict=True) if c.stop]
+        first, way = np.full(len(block.members), math.inf), self._system.scaling.direction
+        for event in stops:
+            np.minimum.at(first, event.member, way * event.time)
+        for m in np.flatnonzero(np.isfinite(first)).tolist():
+            samples = int(np.searchsorted(way * block.times, first[m], side="right"))
+            if samples <= block.reached[m]:
+                block.status[m] = Status.EVENT
+                _end(block, m, samples)
+        for n, event in enumerate(block.events):
+            kept = way * event.time <= first[event.member]
+            if not kept.all():
+                values = {name: v[kept] for name, v in event.values.items()}
+                block.events[n] = BatchEvents(event.name, event.member[kept], event.time[kept], values)
+
+    def _ended_by_drift(self, block: BatchBlock) -> None:
+        """Apply the guard max_drift: the first sample beyond it is the last."""
+        limit = self._family.prepared.scene.config.limits.max_drift
+        if limit is None or not block.drifts:
+            return
+        beyond = block.largest_drifts() > float(limit)
+        for m in np.flatnonzero(beyond.any(axis=0)).tolist():
+            block.status[m] = Status.MAX_DRIFT
+            _end(block, m, int(np.argmax(beyond[:, m])) + 1)
+
+    # --- what is recorded -------------------------------------------------------------------------------
+
+    def _outputs(
+        self,
+        states: np.ndarray,
+        swept: np.ndarray,
+        times: np.ndarray,
+        begun: np.ndarray,
+        along: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """All outputs (outputs, samples, m) of states (samples, states, m) and times (samples, m), internal
+        units; ``along`` has tangent vectors, without which their growth is unknown.
+        """
+        found = np.full((len(self._system.outputs), *times.shape), np.nan)
+        found[~self._of_tangents] = self._evaluated(self._of_motion, states, swept, times, begun)
+        if along is not None:
+            found[self._of_tangents] = self._evaluated(self._growth, along, swept, times)
+        return found
+
+    def _in_si(self, found: np.ndarray, members: np.ndarray) -> Values:
+        """Outputs as recorded variables (samples, m, components), SI."""
+        values: Values = {}
+        for variable in self._system.recorded:
+            columns = [
+                np.ldexp(found[variable.first + k], self._family.whole_numbers(exponent)[members])
+                for k, exponent in enumerate(variable.exponents)
+            ]
+            values[variable.name] = np.stack(columns, axis=2)
+        return values
+
+    def _join(self, values: Values, part: np.ndarray) -> None:
+        """Give each quaternion the sign nearest to the one before, as in a single run."""
+        for variable in self._system.recorded:
+            if variable.continuity != "nearest":
+                continue
+            block = values[variable.name]
+            begin = [self._family.doubles(x)[part] for x in self._system.scene.quaternion]
+            before = np.concatenate([np.stack(begin, axis=1)[None], block[:-1]])
+            products = np.einsum("smc,smc->sm", block, before)
+            signs = np.cumprod(np.where(products < 0, -1.0, 1.0), axis=0)
+            block *= signs[:, :, None]
+
+    def _compiled(self, expressions: Sequence[Any], along: bool = False) -> tuple[Any, list[int]]:
+        """A compiled function of states, and the indices of the states and parameters that it takes."""
+        states = len(self._system.states) if along else self._family.moving
+        variables = [*self._system.variables[:states], *self._family.variables]
+        names = set(hy.get_variables([hy.expression(x) for x in expressions]))
+        read = [n for n, variable in enumerate(variables) if str(variable) in names] or [0]
+        taken = [variables[n] for n in read]
+        made = compiled_function(expressions, taken, compact_mode=self._system.wide, fp_type=float)
+        return made, read
+
+    def _evaluated(
+        self,
+        expressions: Sequence[Any],
+        states: np.ndarray,
+        swept: np.ndarray,
+        times: np.ndarray,
+        begun: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Values (expressions, samples, m) for states (samples, states, m) and times (samples, m)."""
+        samples, count, m = states.shape
+        if not expressions or not times.size:
+            return np.empty((len(expressions), samples, m))
+        function, read = self._compiled(expressions, count > self._family.moving)
+        # parameters of members are inputs like their states
+        every = (samples, m)
+        rows = [states[:, n] if n < count else np.broadcast_to(swept[n - count], every) for n in read]
+        inputs = np.stack(rows).reshape(len(rows), -1)
+        constants = None
+        if function.nparams and begun is not None:
+            constants = np.repeat(begun[:, None], samples, axis=1).reshape(len(begun), -1)
+        found = evaluate_rows(function, inputs.T, constants, times.ravel())
+        return found.reshape(len(expressions), samples, m)
+
+
+def _reached(lanes: LaneResults) -> np.ndarray:
+    """Number of samples that each member reached, (members,)."""
+    return np.logical_and.accumulate(np.isfinite(lanes.states).all(axis=1)).sum(axis=0)
+
+
+def _end(block: BatchBlock, member: int, samples: int) -> None:
+    block.reached[member] = samples
+    for values in (*block.values.values(), *block.drifts.values()):
+        values[samples:, member] = np.nan

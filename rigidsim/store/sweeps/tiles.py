@@ -21,8 +21,8 @@ import h5py
 import numpy as np
 
 from rigidsim.errors import RESUME, RunFolderError
+from rigidsim.scene.schema import RANDOM, AxisTable
 from rigidsim.scene.sweep import Axis, Sweep
-from rigidsim.scene.sweep_table import RANDOM, AxisTable
 from rigidsim.scene.toml_text import apply_overrides, parse_toml
 from rigidsim.store import atomic
 from rigidsim.store.atomic import sink

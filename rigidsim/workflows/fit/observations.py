@@ -28,11 +28,10 @@ from rigidsim.scene.exact import parse_number
 from rigidsim.scene.expressions.names import names_of
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import ExpressionError, names_used, states_read
-from rigidsim.scene.fit_table import FitDataTable
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.row_rotations import normalised, of_euler
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.schema import Config
+from rigidsim.scene.schema import Config, FitDataTable
 from rigidsim.scene.space_axes import SpaceAxes
 from rigidsim.scene.validation_messages import nearest
 from rigidsim.solve.problem import prepare

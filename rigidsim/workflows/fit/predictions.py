@@ -15,9 +15,9 @@ from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.scene.choices import DEFAULT_METHOD
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import parse_number
-from rigidsim.scene.fit_table import KnownWithin
 from rigidsim.scene.row_rotations import conjugated, multiplied, of_vector, vector_of
 from rigidsim.scene.scene import build_scene
+from rigidsim.scene.schema import KnownWithin
 from rigidsim.scene.units import powers, unit_text
 from rigidsim.scene.validation_messages import shown
 from rigidsim.scene.varied_keys import ATTITUDE, VariedKey, varied_keys

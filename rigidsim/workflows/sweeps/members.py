@@ -22,18 +22,19 @@ from rigidsim.scene.cautions import WarningCode
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.parts_of_values import part_name
 from rigidsim.scene.scene import build_scene
+from rigidsim.scene.schema import INDICATORS
 from rigidsim.scene.sweep import FITS, Sweep
-from rigidsim.scene.sweep_table import INDICATORS
 from rigidsim.session.dataset import dataset_variables, kernel_attributes
 from rigidsim.solve.batch.family import (
     AxisNumbers,
+    BatchBlock,
+    BatchRun,
     Families,
     Members,
     NotBatchable,
     Sorted,
     batchable,
 )
-from rigidsim.solve.batch.run import BatchBlock, BatchRun
 from rigidsim.solve.indicators import indicators
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.status import Status

@@ -7,8 +7,7 @@ from support import EPSILON, cases, config
 import rigidsim
 from rigidsim import parse
 from rigidsim.scene.sweep import Sweep
-from rigidsim.solve.batch.family import Families, Members
-from rigidsim.solve.batch.run import BatchBlock, BatchRun
+from rigidsim.solve.batch.family import BatchBlock, BatchRun, Families, Members
 from rigidsim.solve.status import Status
 
 FREE = config(
