@@ -82,6 +82,16 @@ def excludes(key: str, *others: str) -> Rule:
     return rule
 
 
+def only_with(key: str, *others: str) -> Rule:
+    """Some keys with another one alone."""
+
+    def rule(table: Any) -> str:
+        found = [] if _given(table, [key]) else _given(table, others)
+        return f"given {' and '.join(found)} without {key}; add it, or leave these out" if found else ""
+
+    return rule
+
+
 class ConfigTable(BaseModel):
     """A TOML table: unknown keys are errors, values never change after reading, and the text below a key
     describes it. Its ``rules`` are about several keys together.

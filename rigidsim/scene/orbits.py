@@ -6,22 +6,47 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
-from pydantic import Field, StrictStr
+from pydantic import Field, StrictStr, Tag
 
 from rigidsim.errors import ensure
-from rigidsim.scene.arithmetic import WORKING_BITS, bits_in_use, cosine_and_sine, eccentric_anomaly
-from rigidsim.scene.exact import ZERO, ExactNumber
-from rigidsim.scene.fields import Positive, Rate, Rule, Second, excludes, one_of
+from rigidsim.scene import attitude
+from rigidsim.scene.arithmetic import (
+    WORKING_BITS,
+    Matrix,
+    bits_in_use,
+    cosine_and_sine,
+    eccentric_anomaly,
+    transpose,
+)
+from rigidsim.scene.exact import ZERO, ExactNumber, parse_number
+from rigidsim.scene.fields import (
+    NAME_OR_VECTOR,
+    Angle,
+    Positive,
+    Rate,
+    Rule,
+    Second,
+    Triple,
+    excludes,
+    name_or_vector,
+    one_of,
+    only_with,
+)
 from rigidsim.scene.kepler import Ellipse, combined, plane_vectors
 from rigidsim.scene.orbit_tables.elements import read_table
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.registry import LoadFields, Setting
+from rigidsim.scene.space_axes import ECLIPTIC, obliquity, to_ecliptic, to_equator
 from rigidsim.scene.swept import Swept, SweptExact, Untraceable
 from rigidsim.scene.text_tables import TableError
 from rigidsim.scene.validation_messages import nearest
 
+TableFrame = Literal["HCI", "ecliptic J2000", "EME2000", "ICRF", "GCRF"]
+_OF_TABLES = ("format", "frame", "window")
+_HCI = "75.594 deg", "7.155 deg", "0 deg"
+"""Node of the Sun's equator on the ecliptic of J2000 and its inclination, of snvec (Zeebe & Lourens 2022)."""
 MEAN_MOTION_KEYS = ("period", "sidereal_period", "longitude_rate")
 """Keys of which one may replace the mean motion of Kepler's third law."""
 
@@ -43,10 +68,25 @@ class Elements(Ellipse):
     rules: ClassVar[tuple[Rule, ...]] = (
         one_of(*MEAN_MOTION_KEYS, least=0),
         excludes("table", "node_rate", "periapsis_rate"),
+        only_with("table", *_OF_TABLES),
     )
 
     table: StrictStr | None = Field(None, examples=["mars_elements.csv"])
-    """name of a CSV file next to the config, with elements over time"""
+    """name of a file next to the config, with elements over time"""
+    format: Literal["hnbody", "orbitn", "vplanet", "la2010"] | None = None
+    """program whose columns the table has; without it the first line names the columns"""
+    frame: (
+        Annotated[
+            Annotated[TableFrame, Tag(NAME_OR_VECTOR[0])] | Annotated[Triple[Angle], Tag(NAME_OR_VECTOR[1])],
+            name_or_vector(f"one of {', '.join(get_args(TableFrame))} or Euler angles zxz [a, b, c]"),
+        ]
+        | None
+    ) = Field(None, examples=["HCI", ["107.58 deg", "1.58 deg", "0 deg"]])
+    """axes of the table's elements; HCI are the heliocentric ones of HNBody and snvec, with X at the node of
+    the Sun's equator; or the turn from these axes to space axes; by default space axes
+    """
+    window: Positive[Second] | None = Field(None, examples=["2 kyr"])
+    """time over which osculating elements are averaged, by Hann's weights"""
     node_rate: Rate = Field(ZERO, examples=["-19.3 deg/yr"])
     """rate of the ascending node"""
     periapsis_rate: Rate = ZERO
@@ -256,13 +296,15 @@ def _tabulated_orbit(
     *,
     opposite: bool,
     narrow: bool,
+    axes: str | None,
 ) -> TabulatedOrbit:
-    """A table's orbit, made once: of its text, the elements it lacks, and an mpf's parts for Kepler's law;
-    ``opposite`` as in ``Elements``.
+    """A table's orbit, made once: of its text, the elements it lacks, an mpf's parts for Kepler's law, and
+    the name of space axes; ``opposite`` as in ``Elements``.
     """
-    table = read_table(text, bits, narrow=narrow)
-    context = table.context
     given = dict(constants)
+    format, frame, window = (given.pop(key, None) for key in _OF_TABLES)
+    table = read_table(text, bits, narrow=narrow, format=format)
+    context = table.context
     for key in given:
         what = f"has a column {key}, which is given in the config, too; remove one of them"
         ensure(key not in table.columns, TableError(what))
@@ -275,9 +317,27 @@ def _tabulated_orbit(
         return rates[0] if rates else context.sqrt(context.make_mpf(strength) / axis**3)
 
     columns = {key: value.at(context) for key, value in given.items()}
-    orbit = TabulatedOrbit(name, table, columns, motion, opposite=opposite)
+    orbit = TabulatedOrbit(
+        name, table, columns, motion, opposite=opposite,
+        axes=None if frame is None else _table_axes(frame, axes, context),
+        window=None if window is None else window.at(context),
+    )  # fmt: skip
     _ = orbit.error
     return orbit
+
+
+def _table_axes(frame: str | tuple[ExactNumber, ...], axes: str | None, context: Any) -> Matrix:
+    """The axes of a table (rows) in space axes, which are the ecliptic's of J2000 if they have no name."""
+    angles = (ZERO,) * 3 if isinstance(frame, str) else frame
+    if frame == "HCI":
+        angles = tuple(parse_number(angle, "rad") for angle in _HCI)
+    turn = attitude.quaternion_from_euler(context, [angle.at(context) for angle in angles], "zxz")
+    found = transpose(attitude.rotation_matrix(turn))
+    if isinstance(frame, str):
+        of_ecliptic, ecliptic = frame in ("HCI", ECLIPTIC), axes in (None, ECLIPTIC)
+        change = {(True, False): to_equator, (False, True): to_ecliptic}.get((of_ecliptic, ecliptic))
+        found = found if change is None else [change(axis, obliquity(context)) for axis in found]
+    return found
 
 
 def resolve_tabulated_orbit(fields: Elements, strength: Any | None, around: Setting) -> TabulatedOrbit:
@@ -291,11 +351,16 @@ def resolve_tabulated_orbit(fields: Elements, strength: Any | None, around: Sett
     what += f'[tables."{name}"] text (there now: {", ".join(texts) or "none"})'
     ensure(name in texts, around.fault(place, what))
     parts = None if strength is None else strength._mpf_
-    constants = tuple((key, value) for key, value in given if value is not None)
+    constants = tuple(
+        (key, tuple(value) if isinstance(value, list) else value) for key, value in given if value is not None
+    )
+    named = isinstance(fields.frame, str) and fields.frame not in ("HCI", ECLIPTIC)
+    what = f'given "{fields.frame}", but the space axes have no name; give [frame] axes'
+    ensure(not named or around.axes is not None, around.fault(f"{fields.key}.frame", what))
     try:
         orbit = _tabulated_orbit(
             name, texts[name], context.prec, constants, parts,
-            opposite=fields.opposite, narrow=bits_in_use(context) <= WORKING_BITS["double"],
+            opposite=fields.opposite, narrow=bits_in_use(context) <= WORKING_BITS["double"], axes=around.axes,
         )  # fmt: skip
     except TableError as error:
         raise around.fault(place, f'given "{name}": {error}') from None
