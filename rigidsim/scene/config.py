@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from dataclasses import replace as exchanged
 from fractions import Fraction
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -19,10 +19,10 @@ from rigidsim.scene import validation_messages as messages
 from rigidsim.scene.bodies.gravity_field import asked_degree, cut
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import NAME_OR_VECTOR
-from rigidsim.scene.kernels.reading import EMBEDDED, folders_of
+from rigidsim.scene.kernels.reading import EMBEDDED, KernelError, find_file, folders_of
 from rigidsim.scene.paths import leaves
 from rigidsim.scene.registry import LOADS
-from rigidsim.scene.schema import Config, config_model
+from rigidsim.scene.schema import Config, TableText, config_model
 from rigidsim.scene.toml_text import (
     FLAG,
     apply_overrides,
@@ -64,6 +64,12 @@ class Experiment:
     def sha256(self) -> str:
         """SHA-256 of the TOML text of what is run."""
         return hashlib.sha256(self.text.encode()).hexdigest()
+
+    @property
+    def long_tables(self) -> list[Path]:
+        """Files of tables that are too long to be copied into the config."""
+        given = parse_toml(self.text, self.source).get("tables", {})
+        return [find_file(name, self.source, "a table") for name, table in given.items() if "sha256" in table]
 
     @property
     def files(self) -> list[Path]:
@@ -220,7 +226,40 @@ def validated(table: dict[str, Any], source: str) -> Config:
         problems += config_error(model, table, error, {*NAME_OR_VECTOR, *LOADS["kind"]}).problems
     if problems:
         raise ConfigError(problems, source)
-    return config
+    long = {name: table.sha256 for name, table in config.tables.items() if table.sha256 is not None}
+    if not long:
+        return config
+    try:
+        read = {name: TableText(text=_text_of(name, digest, source)) for name, digest in long.items()}
+    except ConfigError as error:
+        raise error.at(source) from None
+    return config.model_copy(update={"tables": {**config.tables, **read}})
+
+
+def _text_of(name: str, digest: str, source: str) -> str:
+    """The text of a long table, which is looked for where kernels are.
+
+    Raises:
+        ConfigError: it isn't there, or another file is.
+    """
+    where = f'[tables."{name}"]'
+    try:
+        path = find_file(name, source, "a table")
+        status = path.stat()
+        found, text = _long_text(path, status.st_size, status.st_mtime_ns)
+    except (KernelError, OSError, UnicodeDecodeError) as error:
+        raise ConfigError(Problem(where, f"given the sha256 of a file, {error}")) from None
+    what = f"given sha256 {digest[:12]}..., but {path} has {found[:12]}...; put there what the run began with"
+    ensure(found == digest, ConfigError(Problem(where, what)))
+    return text
+
+
+@lru_cache(4)
+def _long_text(path: Path, size: int, changed: int) -> tuple[str, str]:
+    """SHA-256 and text of a file as it is now."""
+    data = path.read_bytes()
+    text = data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    return hashlib.sha256(data).hexdigest(), text
 
 
 def load(path: str | Path, *, overrides: Overrides = ()) -> Experiment:
@@ -277,8 +316,13 @@ def _table_sections(config: Config, folder: Path) -> str:
     found: dict[str, str] = {}
     for where, name, read in named:
         if name not in found and name not in config.tables:
-            text = _text(where, name, folder / name, read).rstrip()
-            found[name] = f"\n[tables.{inline(name)}]\ntext = '''\n{text}\n'''\n"
+            path, begin = folder / name, f"\n[tables.{inline(name)}]\n"
+            if read is _whole and path.is_file() and (status := path.stat()).st_size > _LARGEST_TABLE:
+                digest, _ = _long_text(path.absolute(), status.st_size, status.st_mtime_ns)
+                found[name] = f'{begin}sha256 = "{digest}"\n'
+                continue
+            text = _text(where, name, path, read).rstrip()
+            found[name] = f"{begin}text = '''\n{text}\n'''\n"
     return "".join(found.values())
 
 

@@ -56,6 +56,7 @@ from rigidsim.scene.fields import (
     excludes,
     named,
     number_schema,
+    one_of,
     refuse,
 )
 from rigidsim.scene.frame import Frame
@@ -273,8 +274,12 @@ class Limits(ConfigTable):
 class TableText(ConfigTable):
     """``[tables.NAME]``: a table that belongs to the config; files that it names are taken in like this."""
 
-    text: StrictStr
+    rules = (one_of("text", "sha256"),)
+
+    text: StrictStr | None = None
     """text of the CSV file, or of the gravity field"""
+    sha256: Annotated[StrictStr, named("[0-9a-f]{64}", "64 hexadecimal digits")] | None = None
+    """of a file of more than 3 MB next to the config, which is read from there: its SHA-256"""
 
 
 # A number is carried and stored as a sum of float64 parts, which end at 2^-1074: 250 digits (833 bits) leave
@@ -596,7 +601,7 @@ class Config(ConfigTable):
     @property
     def texts(self) -> dict[str, str]:
         """Texts of tables by name."""
-        return {name: table.text for name, table in self.tables.items()}
+        return {name: table.text for name, table in self.tables.items() if table.text is not None}
 
     @model_validator(mode="after")
     def _dated(self) -> Config:

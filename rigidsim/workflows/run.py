@@ -166,7 +166,7 @@ def _place(
     scene = prepared.scene
     places = [None if scene.ephemeris is None else scene.ephemeris.kernel.place]
     places.append(None if scene.orientation is None else scene.orientation.place)
-    kernels = [place for place in places if place is not None]
+    kernels = [place for place in (*places, *prepared.experiment.long_tables) if place is not None]
     refuse_inputs([folder.path], [*prepared.experiment.files, *kernels])
     with folder.locked():
         folder.begin(config, force=force, kernels=kernels)

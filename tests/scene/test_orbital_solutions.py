@@ -130,7 +130,7 @@ def test_osculating_elements_are_averaged_over_a_window() -> None:
     wanted = slow[::-1][10:-10]
     found = np.array([float(table.row(row)["k"]) for row in range(left)])
     assert np.abs(found - wanted).max() < 3e-4  # what a window takes of the wave itself
-    # Hann's window leaves 1 / (pi x (x^2 - 1)) of a ripple, x periods of which are in it; its third difference
+    # Hann's window leaves 1 / (pi x (x^2 - 1)) of a ripple, of which x periods are in it
     x = 8000 / 1200
     leaves = 1e-3 / (np.pi * x * (x * x - 1)) * (2 * np.sin(np.pi / 3)) ** 3
     assert np.abs(np.diff(found - wanted, 3)).max() < leaves

@@ -120,3 +120,23 @@ def test_in_double_precision_a_table_is_that_of_more_digits(config: Path) -> Non
     )
     for name in ("precession", "orbit_eccentricity"):
         np.testing.assert_allclose(double[name], more[name].astype(float), rtol=0, atol=1e-14)
+
+
+def test_a_long_table_is_read_by_its_digest(
+    config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table, plain = tmp_path / "orbit.csv", rigidsim.run(config, out=None).dataset
+    text = table.read_text()
+    table.write_text("# orbit\n" * 400_000 + text)
+    monkeypatch.chdir(tmp_path)
+    run = rigidsim.run(rigidsim.load(config).replace({"limits.max_steps": 20}), out="runs")
+    assert len(Path("runs/deep/config.toml").read_text()) < 2000
+    run = rigidsim.resume("runs/deep", overrides=["limits.max_steps=1000"])
+    np.testing.assert_array_equal(run.dataset.precession, plain.precession)
+    assert rigidsim.verify("runs/deep").identical
+    table.write_text("# another\n" + table.read_text())
+    with pytest.raises(rigidsim.ConfigError, match="put there what the run began with"):
+        rigidsim.verify("runs/deep")
+    table.unlink()
+    with pytest.raises(rigidsim.ConfigError, match="which isn't there: looked for in"):
+        rigidsim.verify("runs/deep")

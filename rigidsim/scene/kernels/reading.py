@@ -368,7 +368,7 @@ def _package(name: str) -> Path | None:
 
 
 def find_file(given: str, source: str, what: str) -> Path:
-    """The absolute path of a kernel that is given by its own; ``what`` it should be.
+    """The absolute path of a file, such as a kernel, that is given by its own; ``what`` it should be.
 
     Raises:
         KernelError: it isn't there.
@@ -394,7 +394,8 @@ def folders_of(source: str) -> list[Path]:
     named = [Path(x) for x in os.environ.get(FOLDERS, "").split(os.pathsep) if x]
     if not file.is_file():
         return [Path.cwd(), *named]
-    noted = file.parent / NOTE
-    lines = noted.read_text(encoding="utf-8").splitlines() if noted.is_file() else []
+    notes = [folder / NOTE for folder in (file.parent, file.parent.parent)]  # of a run, and of its segments
+    texts = [noted.read_text(encoding="utf-8") for noted in notes if noted.is_file()]
+    lines = [line for text in texts for line in text.splitlines()]
     beside = [Path(line.strip()).parent for line in lines if line.strip()]
     return [file.parent, *named, *beside]
