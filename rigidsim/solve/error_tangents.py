@@ -16,7 +16,7 @@ import math
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import heyoka as hy
 import numpy as np
@@ -26,7 +26,8 @@ from rigidsim.model.observables.mechanical import WORK
 from rigidsim.model.parametrised import parameters_of
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import compiled_function, evaluate_rows
-from rigidsim.solve.requirements import propagation
+from rigidsim.solve.lanes import BatchEngine
+from rigidsim.solve.requirements import requirement_of
 from rigidsim.solve.stepper import Mark
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
@@ -49,6 +50,7 @@ _NOTHING = 2.0**-96
 """Initial value, in internal units, that is zero but for the arithmetic of the scene, and no size: a state
 that is measured alone would be lost after its first step.
 """
+_TO_SAME = 64  # steps at most from where a neighbour is to where the motion is
 _HOPELESS = 32_768
 """Steps beyond four times the expected number after which a motion is given up, as before a collision."""
 _ALIKE = 1e-4
@@ -60,33 +62,6 @@ _APART = 2.0**-30  # of a state's size, at which neighbours of a motion that swi
 
 
 # --- what carries motions and tangents ---------------------------------------------------------------------
-
-
-class Carrier(Protocol):
-    """What integrates motions with their tangents, over stretches of ``shortest`` steps or more."""
-
-    shortest: float
-
-    def advance(
-        self,
-        which: np.ndarray,
-        states: np.ndarray,
-        tangents: np.ndarray,
-        late: np.ndarray,
-        begin: np.ndarray,
-        end: np.ndarray,
-        steps: np.ndarray,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Go on by about so many steps (motions,) at most, and no further than to given times (motions,).
-
-        Args:
-            which: numbers of the motions.
-            states, tangents: (states, motions), (states, motions, tangents).
-            late: error of the time that loads depend on, (motions, tangents).
-
-        Returns:
-            States and tangents, not finite if they can't be followed, the steps taken and the times reached.
-        """
 
 
 def timed(rights: Sequence[Any], first: int) -> list[Any]:
@@ -101,23 +76,44 @@ def beside(tangents: np.ndarray, late: np.ndarray) -> np.ndarray:
 
 
 class LaneCarrier:
-    """A single motion and its neighbours in the lanes of a batch: their distances are the tangents. Exact
-    ones take three times as long, and ten times as long to compile.
+    """Motions and their neighbours in lanes of a batch: their distances are the tangents. Exact ones take
+    three times as long, and ten times as long to compile.
+
+    Args:
+        engine: of the equations with an error of the time as their last parameter.
+        read: the other parameters, (parameters, motions).
+        starts: of the motions, whose series bound their steps.
+        system: with pieces that are followed, of a single motion in place of them.
     """
 
     shortest = SHORTEST
 
-    def __init__(self, system: System, tolerance: float, *, compact: bool) -> None:
-        self._first, self._pieces = parameters_of(system), system.pieces
+    def __init__(
+        self, engine: BatchEngine, read: np.ndarray, starts: Starts | None, system: System | None = None
+    ) -> None:
+        self._engine, self._longest = engine, np.full(1, math.inf)
+        self._read = np.concatenate([read, np.zeros((1, read.shape[1]))])
+        if starts is not None:
+            self._longest = engine.longest(starts.states, self._read, starts.begin)
+        self._pieces = None if system is None else system.pieces
+        self._places = {name: place for place, name in enumerate([] if system is None else system.states)}
+
+    @classmethod
+    def of(cls, system: System, tolerance: float, *, compact: bool) -> LaneCarrier:
+        """Of a single motion of a system."""
+        first = parameters_of(system)
         idle = [name == WORK or name.startswith(TANGENT) for name in system.states]
         zero = hy.expression(0.0)  # for what nothing depends on: it would only cost time to compile
         rights = [zero if rests else right for (_, right), rests in zip(system.equations, idle, strict=True)]
-        equations = list(zip(system.variables, timed(rights, self._first), strict=True))
-        options = {"compact_mode": compact or system.wide, "opt_level": 0 if compact else 1}
-        zeros = np.zeros((len(equations), 1 + TANGENTS))
-        self._engine = hy.taylor_adaptive_batch(equations, zeros, tol=tolerance, **options)
-        self._places = {name: place for place, name in enumerate(system.states)}
-        self._go = propagation(system) if system.pieces is None else None
+        engine = BatchEngine(
+            list(zip(system.variables, timed(rights, first), strict=True)),
+            1 + TANGENTS,
+            tolerance=tolerance,
+            compact=compact or system.wide,
+            optimised=False,
+            requirement=requirement_of(system) if system.pieces is None else None,
+        )
+        return cls(engine, np.zeros((first, 1)), None, system)
 
     def advance(
         self,
@@ -129,46 +125,57 @@ class LaneCarrier:
         end: np.ndarray,
         steps: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """See ``Carrier``."""
-        engine, factors = self._engine, beside(tangents, late)[0]
-        engine.set_time(float(begin[0]))
-        engine.state[:] = states
-        engine.state[:, 1:] += factors * tangents[:, 0]
-        if len(engine.pars) > self._first:
-            engine.pars[self._first, 1:] = factors * late[0]
-        taken = self._onward(float(begin[0]), float(end[0]), int(steps[0]))
-        found = np.array(engine.state)
-        moved = (found[:, 1:] - found[:, :1]) / factors
-        return found[:, :1], moved[:, None], np.array([max(taken, 1)]), np.array([float(engine.time[0])])
+        """Go on by about so many steps (motions,) at most, and no further than to given times (motions,);
+        all stretches of as many steps go together.
 
-    def _onward(self, begin: float, end: float, most: int) -> int:
-        """Go on, through pieces of the equations; returns the steps of the motion itself."""
-        pieces, engine, taken = self._pieces, self._engine, 0
-        if pieces is None:
-            return self._to(end, most)
-        number = pieces.number_at(begin)
+        Args:
+            which: numbers of the motions.
+            states, tangents: (states, motions), (states, motions, tangents).
+            late: error of the time that loads depend on, (motions, tangents).
+
+        Returns:
+            States and tangents, not finite if they can't be followed, the steps taken and the times reached.
+        """
+        factors, lanes = beside(tangents, late), 1 + TANGENTS
+        every = np.repeat(states[:, :, None], lanes, axis=2)
+        every[:, :, 1:] += factors * tangents
+        read = np.repeat(self._read[:, which][:, :, None], lanes, axis=2)
+        read[-1, :, 1:] = factors * late
+        times, taken = np.empty(every.shape[1:]), np.empty(every.shape[1:])
+        for stride in np.unique(steps).tolist():
+            alike = np.flatnonzero(steps == stride)
+            first, last, bounds = (np.repeat(x[alike], lanes) for x in (begin, end, self._longest[which]))
+            there, flat = (x[:, alike].reshape(len(x), -1) for x in (every, read))
+            there, then, gone = self._onward(int(stride), there, flat, first, last, bounds)
+            # neighbours took steps of almost the same lengths
+            reached = np.repeat(then.reshape(-1, lanes)[:, 0], lanes)
+            there, *_ = self._engine.onward(_TO_SAME, there, flat, then, reached, bounds)
+            every[:, alike] = there.reshape(len(every), -1, lanes)
+            times[alike], taken[alike] = then.reshape(-1, lanes), gone.reshape(-1, lanes)
+        moved = (every[:, :, 1:] - every[:, :, :1]) / factors
+        return every[:, :, 0], moved, np.maximum(taken[:, 0], 1), times[:, 0]
+
+    def _onward(
+        self, most: int, there: np.ndarray, read: np.ndarray, now: np.ndarray, ends: np.ndarray, *more: Any
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Go on, through pieces of the equations."""
+        if self._pieces is None:
+            return self._engine.onward(most, there, read, now, ends, *more)
+        number, taken = self._pieces.number_at(float(now[0])), np.zeros(len(now))
         while True:
-            if number and float(pieces.knots[number - 1]) == float(engine.time[0]):
-                for name, value in pieces.states(number).items():
-                    engine.state[self._places[name]] = value
-            values = np.array(pieces.parameters(number), dtype=float)
-            engine.pars[: self._first][-len(values) :] = values[:, None]
-            edge = float(pieces.knots[number]) if number < len(pieces.knots) else math.inf
-            taken += self._to(min(end, edge), most - taken)
-            reached = float(engine.time[0])
-            if reached < edge or edge >= end or taken >= most:
-                return taken
-            number += 1
-
-    def _to(self, until: float, most: int) -> int:
-        engine = self._engine
-        go = self._go or (lambda engine, until, most: engine.propagate_until(until, max_steps=most))
-        go(engine, until, most)
-        taken, reached = int(engine.propagate_res[0][3]), float(engine.time[0])
-        if any(float(time) != reached for time in engine.time):
-            # the others took steps of almost the same lengths
-            go(engine, reached, _HOPELESS)
-        return taken
+            knots = self._pieces.knots
+            if number and float(knots[number - 1]) == now[0]:
+                for name, value in self._pieces.states(number).items():
+                    there[self._places[name]] = value
+            edge = float(knots[number]) if number < len(knots) else math.inf
+            values = np.array(self._pieces.parameters(number), dtype=float)
+            read[-1 - len(values) : -1] = values[:, None]
+            there, now, gone = self._engine.onward(
+                most - int(taken[0]), there, read, now, np.minimum(ends, edge), *more
+            )
+            taken, number = taken + gone, number + 1
+            if (now < edge).any() or edge >= ends[0] or taken[0] >= most:
+                return there, now, taken
 
 
 class SteppedCarrier:
@@ -197,7 +204,7 @@ class SteppedCarrier:
         end: np.ndarray,
         steps: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """See ``Carrier``."""
+        """See ``LaneCarrier``."""
         first, until = float(begin[0]), min(float(end[0]), float(begin[0]) + float(steps[0]) / self._pace)
         taken, time, moved = np.array([(until - first) * self._pace]), np.array([until]), tangents.copy()
         marks: list[Mark] = []
@@ -288,7 +295,7 @@ class ErrorTangents:
 
     def __init__(
         self,
-        carrier: Carrier,
+        carrier: LaneCarrier | SteppedCarrier,
         measures: Measures,
         starts: Starts,
         perturbations: Perturbations,

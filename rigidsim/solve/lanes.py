@@ -14,6 +14,7 @@ import numpy as np
 
 from rigidsim.solve.compiled import Kept
 from rigidsim.solve.events import DIRECTIONS
+from rigidsim.solve.requirements import Requirement
 from rigidsim.solve.stepper import bound_of_sparse_series, longest_step
 
 _GRID = 1 << 16
@@ -71,7 +72,7 @@ def _grouped(values: np.ndarray, width: int) -> np.ndarray:
 
 class BatchEngine:
     """A compiled batch integrator of ``width`` lanes, of equations and events (with directions) over heyoka's
-    variables and ``par``, the parameters of both.
+    variables and ``par``, the parameters of both; ``requirement`` is what they need before steps.
     """
 
     def __init__(
@@ -82,12 +83,14 @@ class BatchEngine:
         events: Sequence[tuple[Any, int]] = (),
         tolerance: float | None = None,
         compact: bool = False,
+        optimised: bool = True,
+        requirement: Requirement | None = None,
     ) -> None:
-        self.width = width
+        self.width, self._requirement = width, requirement or Requirement()
         # recorded quantities may read more parameters than equations and events
         read = [right for _, right in equations] + [expression for expression, _ in events]
         self._used = max((int(str(p).removeprefix("p")) + 1 for p in hy.get_params(read)), default=0)
-        key = list(equations), list(events), width, compact, tolerance
+        key = list(equations), list(events), width, compact, tolerance, optimised
         self._integrator, self._log = _engines.get(key, lambda: self._made(*key))
         self._longest = longest_step(self._integrator.order, np.float64)
 
@@ -98,10 +101,11 @@ class BatchEngine:
         width: int,
         compact: bool,
         tolerance: float | None,
+        optimised: bool,
     ) -> tuple[Any, list[Found]]:
         """An integrator, and the crossings of its events since the list was cleared."""
         log: list[Found] = []
-        options: dict[str, Any] = {"compact_mode": compact}
+        options: dict[str, Any] = {"compact_mode": compact, "opt_level": 3 if optimised else int(not compact)}
         if tolerance is not None:
             options["tol"] = tolerance
         if self._used:
@@ -176,7 +180,9 @@ class BatchEngine:
         steps = np.empty(then.shape)
         for group in range(len(there)):
             self._set(there[group], read[group], then[group])
-            integrator.propagate_until(ends[group], max_steps=most_steps, max_delta_t=bounds[group])
+            self._requirement.meet(integrator)
+            options = {"max_delta_t": bounds[group], "callback": list(self._requirement.each) or None}
+            integrator.propagate_until(ends[group], max_steps=most_steps, **options)
             there[group], then[group] = integrator.state, integrator.time
             steps[group] = [outcome[3] for outcome in integrator.propagate_res]
         found, times = np.concatenate(list(there), axis=1)[:, :count], then.ravel()[:count]

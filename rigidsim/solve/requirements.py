@@ -145,14 +145,3 @@ class SecondNumber(Requirement):
 
     def meet(self, integrator: TaylorEngine) -> None:
         self._set(integrator)
-
-
-def propagation(system: System) -> Callable[[Any, Any, int], Any]:
-    """``propagate_until`` of single or batch engines of a system without tables: to times, by most steps."""
-    requirement = requirement_of(system)
-
-    def propagate(integrator: Any, until: Any, most: int) -> Any:
-        requirement.meet(integrator)
-        return integrator.propagate_until(until, max_steps=most, callback=list(requirement.each) or None)
-
-    return propagate

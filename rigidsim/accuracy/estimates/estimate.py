@@ -30,7 +30,6 @@ from rigidsim.solve.compiled import compiled_function, evaluate_rows, interrupti
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.effects.waypoints import SampleTrail, Waypoint, Waypoints
 from rigidsim.solve.error_tangents import (
-    Carrier,
     ErrorTangents,
     Held,
     Known,
@@ -452,7 +451,7 @@ def _tangents_of(run: _Run, start: float, end: float) -> ErrorTangents:
     prepared, system, precision = run.prepared, run.system, run.prepared.precision
     measures, known, carrier = Measures(system), None, _stepped(run, start, end)
     if carrier is None:
-        carrier = LaneCarrier(system, _TOLERANCE, compact=run.steps * run.part < _UNROLLED)
+        carrier = LaneCarrier.of(system, _TOLERANCE, compact=run.steps * run.part < _UNROLLED)
         if run.regular and run.waypoints:
             states = np.array([one.state for one in run.waypoints])[:, :, None]
             known = Known(np.ldexp([[one.time] for one in run.waypoints], run.shift), states)
@@ -482,7 +481,7 @@ def _tangents_of(run: _Run, start: float, end: float) -> ErrorTangents:
     )
 
 
-def _stepped(run: _Run, start: float, end: float) -> Carrier | None:
+def _stepped(run: _Run, start: float, end: float) -> SteppedCarrier | None:
     """What follows the motion by separate steps; None where that costs more than code for all motions."""
     prepared, system = run.prepared, run.system
     if not (system.switches or run.steps < _BY_ITSELF):

@@ -26,14 +26,12 @@ from rigidsim.accuracy.estimates.estimate import (
 )
 from rigidsim.solve.batch.family import BatchBlock, Family
 from rigidsim.solve.error_tangents import (
-    SHORTEST,
-    TANGENTS,
     ErrorTangents,
     Known,
+    LaneCarrier,
     Measures,
     Spread,
     Starts,
-    beside,
     timed,
 )
 from rigidsim.solve.lanes import BatchEngine
@@ -41,7 +39,6 @@ from rigidsim.solve.lanes import BatchEngine
 _TOLERANCE = 1e-8  # of lanes, which begin anew at some of the samples
 _BEGUN_ANEW = 16  # times at most
 _STRETCHES = 6
-_TO_SAME = 64  # steps at most from where a neighbour is to where the motion is
 _LANES = 8
 """Least number of lanes: a step of eight in vectors of four costs 1.6 of one of four."""
 _BY_CHANCE = 8.0
@@ -174,7 +171,7 @@ class MemberEstimates:
 
     def _followed(self, block: BatchBlock, some: np.ndarray, starts: Starts) -> Spread:
         epsilon, read = self._epsilon, starts.parameters[self._family.in_equations]
-        carrier = MemberCarrier(self._lanes, read, starts)
+        carrier = LaneCarrier(self._lanes, read, starts)
         loose = max(self._prepared.effective_tolerance / epsilon, 1.0)
         errors = plain_perturbations(self._prepared.system, loose)
         rows = np.unique(np.linspace(0, len(block.moments) - 1, _BEGUN_ANEW + 2).astype(int)[1:-1])
@@ -188,46 +185,3 @@ class MemberEstimates:
             carrier, self._measures, starts, errors, epsilon, known=known, stretches=_STRETCHES
         )
         return tangents.follow(lost=math.pi / epsilon)
-
-
-class MemberCarrier:
-    """Carrier of members and their neighbours in lanes, all of whose stretches of as many steps go together;
-    see ``Carrier``.
-    """
-
-    shortest = SHORTEST
-
-    def __init__(self, engine: BatchEngine, read: np.ndarray, starts: Starts) -> None:
-        self._engine = engine
-        self._read = np.concatenate([read, np.zeros((1, read.shape[1]))])
-        self._longest = engine.longest(starts.states, self._read, starts.begin)
-
-    def advance(
-        self,
-        which: np.ndarray,
-        states: np.ndarray,
-        tangents: np.ndarray,
-        late: np.ndarray,
-        begin: np.ndarray,
-        end: np.ndarray,
-        steps: np.ndarray,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """See ``Carrier``."""
-        factors, lanes = beside(tangents, late), 1 + TANGENTS
-        every = np.repeat(states[:, :, None], lanes, axis=2)
-        every[:, :, 1:] += factors * tangents
-        read = np.repeat(self._read[:, which][:, :, None], lanes, axis=2)
-        read[-1, :, 1:] = factors * late
-        times, taken = np.empty(every.shape[1:]), np.empty(every.shape[1:])
-        for stride in np.unique(steps).tolist():
-            alike = np.flatnonzero(steps == stride)
-            first, last, bounds = (np.repeat(x[alike], lanes) for x in (begin, end, self._longest[which]))
-            there, flat = (x[:, alike].reshape(len(x), -1) for x in (every, read))
-            there, then, gone = self._engine.onward(int(stride), there, flat, first, last, bounds)
-            # neighbours took steps of almost the same lengths
-            reached = np.repeat(then.reshape(-1, lanes)[:, 0], lanes)
-            there, *_ = self._engine.onward(_TO_SAME, there, flat, then, reached, bounds)
-            every[:, alike] = there.reshape(len(every), -1, lanes)
-            times[alike], taken[alike] = then.reshape(-1, lanes), gone.reshape(-1, lanes)
-        moved = (every[:, :, 1:] - every[:, :, :1]) / factors
-        return every[:, :, 0], moved, taken[:, 0], times[:, 0]
