@@ -54,8 +54,7 @@ from rigidsim.scene.expressions.tree import (
     names_used,
     operate,
 )
-from rigidsim.scene.initial_values import start_values
-from rigidsim.scene.scene import Scene
+from rigidsim.scene.scene import Scene, start_values
 from rigidsim.scene.schema import Config
 from rigidsim.scene.surfaces import random_states, value_at
 

@@ -21,8 +21,7 @@ from rigidsim.model.scaling import Scaling, exponent
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.expressions.names import BODY_NAMES, RATE_NAMES, NameProvider, Readable, provides
 from rigidsim.scene.expressions.tree import Expression, ExpressionError, evaluate, names_used
-from rigidsim.scene.initial_values import start_values
-from rigidsim.scene.scene import Scene
+from rigidsim.scene.scene import Scene, start_values
 from rigidsim.scene.schema import Config
 from rigidsim.scene.surfaces import changes, random_states
 from rigidsim.scene.transitions import narrow_parts

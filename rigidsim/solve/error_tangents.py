@@ -23,12 +23,12 @@ import numpy as np
 
 from rigidsim.model.names import TANGENT
 from rigidsim.model.observables.mechanical import WORK
-from rigidsim.model.parametrised import parameters_of
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import compiled_function, evaluate_rows
 from rigidsim.solve.lanes import BatchEngine
 from rigidsim.solve.requirements import requirement_of
 from rigidsim.solve.stepper import Mark
+from rigidsim.solve.tangents import parameters_of
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
 TANGENTS = 3

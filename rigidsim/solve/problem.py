@@ -21,9 +21,8 @@ from rigidsim.model.two_part import in_two_parts
 from rigidsim.scene.choices import AUTO, FORMULATIONS
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.expressions.tree import ExpressionError
-from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.paths import numbers
-from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.scene.scene import Scene, build_scene, check_start
 from rigidsim.solve.first_step import refuse_non_finite_start, refuse_roots_of_zero
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 from rigidsim.solve.sampling import SampleClock
@@ -31,7 +30,7 @@ from rigidsim.solve.solvers.algorithm import Algorithm, algorithm_of
 
 if TYPE_CHECKING:
     from rigidsim.model.averaged.average import Average
-    from rigidsim.model.parametrised import Parametrised
+    from rigidsim.solve.by_keys import Parametrised
 
 DRIFT_FACTOR = 50.0
 """A sound run keeps relative drifts below this times tolerance times sqrt(steps): rounding errors of the

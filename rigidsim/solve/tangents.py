@@ -21,7 +21,6 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.parametrised import parameters_of
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import compiled_engine
@@ -348,3 +347,12 @@ class Tangents:
                 pars[first : first + len(values)] = values
             self._entered = number
         return self._knots.end_after(self._engine.time)
+
+
+def parameters_of(system: System) -> int:
+    """Number of parameters that a system's equations may use."""
+    count = system.parameters
+    if system.pieces is not None:
+        count = max(count, system.first_of_pieces + len(system.pieces.parameters(0)))
+    used = [int(str(p)[1:]) + 1 for p in hy.get_params([right for _, right in system.equations])]
+    return max([count, *used])

@@ -12,7 +12,7 @@ from rigidsim import ConfigError
 from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.earth_axes import earth_axes
 from rigidsim.scene.epochs import parse_epoch
-from rigidsim.scene.initial_values import start_values
+from rigidsim.scene.scene import start_values
 from rigidsim.solve.problem import prepare
 
 PYMSIS = {

@@ -67,11 +67,10 @@ from rigidsim.scene.fields import (
     together,
     within,
 )
-from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.point_masses import kepler_reach
 from rigidsim.scene.readable import length_text, value_text
 from rigidsim.scene.registry import EffectPart, LoadFields, Setting, register_load
-from rigidsim.scene.scene import Scene
+from rigidsim.scene.scene import Scene, start_values
 from rigidsim.scene.schema import Config
 from rigidsim.scene.swept import plain
 from rigidsim.scene.transitions import WIDE, narrow_parts, root_parts

@@ -33,9 +33,8 @@ from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.choices import DEFAULT_METHOD, FULL, variables_named
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.paths import Path
-from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.scene.scene import Scene, build_scene, check_start
 from rigidsim.scene.sweep import Sweep
 from rigidsim.scene.swept import Swept, SweptContext, SweptExact, Untraceable
 from rigidsim.solve.compiled import compiled_function, evaluate_rows

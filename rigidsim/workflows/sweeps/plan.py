@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from rigidsim.errors import ConfigError, Problem, Remedy
-from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.registry import OBSERVABLES
-from rigidsim.scene.scene import build_scene
+from rigidsim.scene.scene import build_scene, check_start
 from rigidsim.scene.sweep import Sweep
 from rigidsim.session.dataset import dataset_variables, refuse_taken_names
 from rigidsim.solve.lanes import recommended_width
