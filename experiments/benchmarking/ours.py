@@ -24,7 +24,6 @@ def in_a_folder(config: Path, out: Path) -> dict[str, float]:
 
         import rigidsim.look.timeline
         import rigidsim.look.timeline.blueprint
-        import rigidsim.look.timeline.entities
 
         xarray.Variable((), 0.0)  # imports dask where it is installed
     run, parse = rigidsim.run, rigidsim.parse

@@ -14,7 +14,7 @@ rerun, `figures` matplotlib. All else is numbers and texts, for both.
 | `stages` | stages by kind of scene, as entities of rerun; a package of its own |
 | `sources`, `gyrostats` | what pulls at a body, and librations; bodies with rotors |
 | `fits` | secular parts, periods and ellipses, by ``analysis`` |
-| `thinning`, `states` | a bounded number of a dataset's rows; lanes of events |
+| `thinning` | a bounded number of a dataset's rows |
 | `solids` | meshes of bodies, toy tops, globes and maps, edges |
 | `viewer`, `film` | the viewer, also of a run that goes on; pictures and films of a timeline |
 """

@@ -9,10 +9,9 @@ import xarray
 
 from rigidsim.look import fits, signals, sources
 from rigidsim.look.curves import precesses
-from rigidsim.look.record import scene_of
+from rigidsim.look.record import events_of, scene_of
 from rigidsim.look.signals import need, optional
 from rigidsim.look.solids import Array
-from rigidsim.look.states import events_of
 from rigidsim.scene.readable import angle_text, period_text, scaled, span_text, with_unit
 
 _TURN = 2 * np.pi

@@ -167,6 +167,17 @@ def _of_version_1_0(dataset: xarray.Dataset) -> dict[str, Any]:
     }
 
 
+def events_of(dataset: xarray.Dataset) -> list[str]:
+    """Names of the events whose times the dataset has."""
+    names = []
+    for name in (*map(str, dataset.data_vars), *map(str, dataset.coords)):
+        variable = dataset[name]
+        event = str(variable.attrs.get("event", ""))
+        if event and name == f"{event}_time" and variable.dims == (event,) and variable.shape[0]:
+            names.append(event)
+    return names
+
+
 def body_of(one: dict[str, Any]) -> KnownBody | None:
     """The known body with the gravitational parameter of a recorded object; None if it is no known one."""
     return known_body(float(one.get("gravitational_parameter") or 0.0))

@@ -16,6 +16,7 @@ from rigidsim.look import signals, sources
 from rigidsim.look.curves import loop_rows
 from rigidsim.look.fits import secular, turn_text
 from rigidsim.look.record import called, color_of, named_body, scene_of
+from rigidsim.look.signals import need, optional
 from rigidsim.look.solids import Array, Mesh, globe, graticule, pictured_globe
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import FIELD, Subject, direction_of, eye_at, source_arrows
@@ -46,20 +47,18 @@ _LIFT = 1.012  # of the point under the source, in radii
 _MARK = 0.03  # radius of the ring about longitude and latitude zero
 
 
-def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
+def picture(dataset: xarray.Dataset, subject: Subject) -> Picture:
     """Picture of a large, nearly round body that spins nearly about its figure axis, and of any body without
-    attitude and rates whose figure axis or momentum is known; None for others.
+    attitude and rates whose figure axis or momentum is known.
     """
     figure, turns = scene_of(dataset).figure, subject.attitude is not None
     still = not turns and "angular_velocity" not in dataset
     sizes = _semi_axes(dataset, subject)
-    if subject.position is not None or not (still or sizes is not None):
-        return None
+    need(subject.position is None and (still or sizes is not None))
     axes, beside = _known_axes(dataset) if still else ({}, False)
     if subject.attitude is not None:
         axes = {"figure": subject.attitude @ figure}
-    if sizes is None and not axes:
-        return None
+    need(bool(axes) or sizes is not None)
     if still and "figure" in axes:
         subject = _pointed(subject, figure, axes["figure"])
     notes: list[str] = []
@@ -210,14 +209,11 @@ def _known_axes(dataset: xarray.Dataset) -> tuple[dict[str, Array], bool]:
     return found, beside
 
 
-def _against_plane(dataset: xarray.Dataset, axis: str) -> Array | None:
+@optional
+def _against_plane(dataset: xarray.Dataset, axis: str) -> Array:
     """Unit vectors (rows, 3) along the plane's X', Y' and normal, from obliquity and node longitude."""
-    if "obliquity" not in dataset or "node_longitude" not in dataset:
-        return None
-    pair = signals.orientation(dataset, axis)
-    if pair is None:
-        return None
-    tilt, node = pair
+    need("obliquity" in dataset and "node_longitude" in dataset)
+    tilt, node = need(signals.orientation(dataset, axis))
     return np.stack([np.sin(tilt) * np.sin(node), -np.sin(tilt) * np.cos(node), np.cos(tilt)], axis=1)
 
 
@@ -310,13 +306,11 @@ def _whole_revolution(dataset: xarray.Dataset, span: float) -> bool:
     return True
 
 
-def facing(
-    dataset: xarray.Dataset, subject: Subject, figure: Array, marks: list[Part]
-) -> tuple[Stage, str] | None:
+@optional
+def facing(dataset: xarray.Dataset, subject: Subject, figure: Array, marks: list[Part]) -> tuple[Stage, str]:
     """Stage and note of a globe that faces its strongest source at the end of the run; None for others."""
-    found = sources.seen(dataset)
-    if found is None or not np.isfinite(found.directions).all() or not found.stays(found.last):
-        return None
+    found = need(sources.seen(dataset))
+    need(np.isfinite(found.directions).all() and found.stays(found.last))
     source, attitude, directions = called(found.body, found.name), subject.attitude, found.directions
     toward = directions if attitude is None else np.einsum("tij,tj->ti", attitude, directions)
     up = figure if attitude is None else np.nanmean(attitude @ figure, axis=0)

@@ -85,43 +85,38 @@ class AxisUncertainty:
         return np.asarray(np.cos(size) * self.axis + np.sinc(size / np.pi) * sideways)
 
 
-def with_cone(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Picture:
-    """The picture with the cone of the dataset's uncertain attitude, if it has one and the body turns."""
+def add_cone(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> None:
+    """Put the cone of the dataset's uncertain attitude on a picture, if it has one and the body turns."""
     covariance = signals.values(dataset, COVARIANCE)
     if covariance is None or subject.attitude is None:
-        return picture
+        return
     found = AxisUncertainty.of(scene_of(dataset).figure, subject.attitude, covariance)
     angles = found.half_angles
     largest = float(np.nanmax(angles, initial=0.0))
     if not largest > _ROUNDING * float(np.nanmax(found.about, initial=0.0)):
         why = "none of the fitted numbers moves it" if np.isfinite(angles).any() else "it has no bounds"
-        return replace(picture, notes=[*picture.notes, f"no uncertainty of the figure axis is drawn: {why}"])
+        picture.notes.append(f"no uncertainty of the figure axis is drawn: {why}")
+        return
     factor = drawn_factor(largest)
     words = "1 sigma of the figure axis" + ("" if factor == 1 else f", drawn × {factor:g}")
     rim = np.nan_to_num(found.rim(factor))
     # the other side of a top's axis goes through the ground
     sides = [rim] if signals.is_top(dataset) else [rim, -rim]
-    notes = [
+    picture.notes.append(
         f"{words} (white cone): the standard deviation that the fit predicts by the sigmas of its data and "
         "priors; the half-angles are the roots of the covariance across the axis, times that factor if there "
         "is one; their true values are plotted"
-    ]
+    )
     if not np.isfinite(angles).all():
-        notes.append("where there is no cone, an undetermined parameter would move the axis without bounds")
+        picture.notes.append(
+            "where there is no cone, an undetermined parameter would move the axis without bounds"
+        )
     table, title = np.column_stack([angles, found.about]), "1 sigma of the figure axis"
     labels = ("widest", "narrowest", "about it")
     plot = plotted(dataset, _LEADING, title, table, labels=labels, word="1 sigma")
-    return replace(
-        picture,
-        stages=[
-            replace(one, parts=[*one.parts, *_cone(sides, _ON_DISC if one.flat else _REACH, words)])
-            if one.size > _TO_SCALE
-            else one
-            for one in picture.stages
-        ],
-        notes=[*picture.notes, *notes],
-        plots=[*picture.plots, *([replace(plot, error=None)] if plot else [])],
-    )
+    picture.plots.extend([replace(plot, error=None)] if plot else [])
+    for stage in [one for one in picture.stages if one.size > _TO_SCALE]:
+        stage.parts.extend(_cone(sides, _ON_DISC if stage.flat else _REACH, words))
 
 
 def drawn_factor(largest: float) -> float:

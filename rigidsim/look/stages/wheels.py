@@ -31,8 +31,8 @@ _PICTURES = 30.0  # a second on the screen that are surely drawn
 _TOO_FAST, _SLOWED = 1 / 3, 1 / 12  # turns from one picture to the next: from which on, and then
 
 
-def with_wheels(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Picture:
-    """The picture with the dataset's rotors on its body, if it has some and the body is drawn to scale: discs
+def add_wheels(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> None:
+    """Put the dataset's rotors on a picture's body, if it has some and the body is drawn to scale: discs
     where their axes leave it, one above the other if they share an axis.
     """
     found = gyrostats.rotors(dataset)
@@ -42,7 +42,7 @@ def with_wheels(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> 
         picture.notes.append(f"not drawn, since rotor_rate isn't recorded: rotor {', '.join(missing)}")
     to_scale = [stage for stage in picture.stages if stage.unit == subject.reach and stage.size]
     if not found or not to_scale:
-        return picture
+        return
     stage, inertia = to_scale[0], gyrostats.tensor(dataset)
     corners = np.concatenate([mesh.vertices for mesh in subject.meshes])
     slowed, tops = [_slowing(dataset, rotor) for rotor in found], dict[tuple[float, ...], float]()
@@ -67,7 +67,6 @@ def with_wheels(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> 
         stage.parts.append(parts.spot(f"{name}/label", rotor.name, _MARK, beside, BODY))
         stage.parts.append(lines(f"{name}/axle", _MARK, [axle], words, place=BODY, width=2.0, strength=0.7))
     _momenta(dataset, stage, found, picture.notes)
-    return picture
 
 
 def _slowing(dataset: xarray.Dataset, rotor: RecordedRotor) -> float:

@@ -5,8 +5,7 @@ Importing this package loads rerun, so import it only where a timeline is writte
 | module | holds |
 | --- | --- |
 | `writing` | `write_timeline`, `write_comparison`: datasets to files; `LiveRecording`: of a running one |
-| `drawn` | everything that is drawn of one run |
-| `entities` | plots, planes, legend and clock as rerun entities, next to those of ``look.stages`` |
+| `drawn` | everything that is drawn of one run: stages, plots, planes, lanes of states, legend and clock |
 | `blueprint` | the page that the viewer opens with, for one run and for several |
 """
 

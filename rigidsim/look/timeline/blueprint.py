@@ -10,8 +10,14 @@ from rerun.blueprint.components import LinkAxis
 from rigidsim.look.curves import Plot
 from rigidsim.look.paths import Path
 from rigidsim.look.stages.parts import Color, Stage
-from rigidsim.look.timeline import entities
-from rigidsim.look.timeline.drawn import Clock, DrawnRun
+from rigidsim.look.timeline.drawn import (
+    LEGEND_COLUMNS,
+    LEGEND_LINE,
+    Clock,
+    DrawnRun,
+    legend_of,
+    plot_path,
+)
 
 TRAIL_ROWS = 450  # at most in the bright end of a trail, and never more than a tenth of the run
 PIXELS = 800.0  # about the height of the page
@@ -42,7 +48,7 @@ def build_blueprint(
     scene = spaces[0] if len(shares) == 1 else rrb.Horizontal(*spaces, *beside, column_shares=shares)
     pages = {page.lower(): page for page in run.pages if part is None or (part, page) == ("page", "Summary")}
     height = height / 2 if part == PLAYER else height
-    left = left_side(scene, entities.legend_of(stages), pages, height)
+    left = left_side(scene, legend_of(stages), pages, height)
     views = {
         place: [plot_view([plot], clock) for plot in run.plots if plot.place == place]
         for place in ("leading", "drift", "more")
@@ -91,7 +97,7 @@ def build_comparison(
         views.append(plot_view(found, clock, named=curves <= _CURVES))  # leading plots name the colours, too
     left = left_side(
         scene,
-        entities.legend_of([stage for run in runs for stage in run.picture.stages]),
+        legend_of([stage for run in runs for stage in run.picture.stages]),
         {page.lower(): name for name, run in named for page in run.pages},
     )
     panel = time_panel(clock, max(run.screen_seconds for run in runs), hidden=not bars)
@@ -123,14 +129,14 @@ def left_side(
     pixels: float = PIXELS,
 ) -> rrb.Container:
     """The scene above its legend and the text pages, by their entities, about so many pixels high."""
-    lines = -(-(1 + len(legend)) // entities.LEGEND_COLUMNS)  # with the clock
+    lines = -(-(1 + len(legend)) // LEGEND_COLUMNS)  # with the clock
     height = 30.0 + 24.0 * lines
     key = rrb.Spatial2DView(
         origin="/legend",
         name="What is shown",
         titlebar=bool(pages),
         background=_DARK,
-        visual_bounds=rrb.VisualBounds2D(x_range=(0.0, 30.0), y_range=(0.0, entities.LEGEND_LINE * lines)),
+        visual_bounds=rrb.VisualBounds2D(x_range=(0.0, 30.0), y_range=(0.0, LEGEND_LINE * lines)),
     )
     texts: list[rrb.View] = [
         rrb.TextDocumentView(origin=f"/{entity}", name=name) for entity, name in pages.items()
@@ -233,7 +239,7 @@ def plot_view(plots: Sequence[Plot], clock: Clock, *, named: bool = True) -> rrb
     corner = rrb.Corner2D.RightBottom if first.place == "drift" else rrb.Corner2D.LeftTop
     return rrb.TimeSeriesView(
         origin="/plots",
-        contents=[f"/{entities.plot_path(plot)}/**" for plot in plots],
+        contents=[f"/{plot_path(plot)}/**" for plot in plots],
         name=first.heading,
         plot_legend=rrb.PlotLegend(visible=named and lines > 1, corner=corner),
         axis_y=None if first.steady is None else rrb.ScalarAxis(range=first.steady),
