@@ -230,6 +230,8 @@ class ConstantInertia(Inertia):
         return result
 
 
+# --- the state ----------------------------------------------------------------------------------------------
+
 T = TypeVar("T")
 
 

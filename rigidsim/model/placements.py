@@ -141,6 +141,9 @@ def ecliptic_plane() -> OrbitPlane:
     )  # fmt: skip
 
 
+# --- places -------------------------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True)
 class Circuit:
     """How a source goes round, as far as averages have to know.

@@ -286,6 +286,8 @@ def refused(level: str, against: str, remedy: str = _FULL) -> ConfigError:
     return ConfigError(Problem("[model] level", f'given "{level}", but {against}; {remedy}'))
 
 
+# --- torques of the body alone ------------------------------------------------------------------------------
+
 EPSILON = 2.0**-60
 """Error that mean torques are worked out to in double precision and below; in higher ones 2^-7 epsilon."""
 PARAMETER = 0.98
@@ -782,6 +784,8 @@ def _kick(before: Wobble, after: Wobble, source: Source, seconds: float) -> floa
         total += float(order * energy.sum() / min(before.size, after.size)) * math.sqrt(2 * math.pi / drift)
     return total
 
+
+# --- the average --------------------------------------------------------------------------------------------
 
 _ROUNDS = 4  # iterations; each gains a factor of the nutation's size
 

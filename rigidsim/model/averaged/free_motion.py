@@ -221,6 +221,8 @@ def means_needed(parameter: float, epsilon: float) -> int:
     return _MEANS
 
 
+# --- one turn of the wobble ---------------------------------------------------------------------------------
+
 _POINTS = 256
 ORDERS = np.fft.fftfreq(_POINTS, 1 / _POINTS)
 """j of the harmonics."""

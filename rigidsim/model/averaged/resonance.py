@@ -231,6 +231,9 @@ def _rotations(vectors: np.ndarray) -> np.ndarray:
 _ROUNDS = 4  # iterations of the start; each gains a factor of the nutation's size
 
 
+# --- the resonance ------------------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True)
 class SlowStart:
     """Initial state of a resonant average; mpf."""

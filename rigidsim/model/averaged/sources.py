@@ -223,6 +223,9 @@ class OrbitTerms:
         return nutation(hy, self.ellipse, place, size, s, (lambda x: x) if given else self.number)
 
 
+# --- sources ------------------------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True, kw_only=True)
 class Source(Circuit):
     """The source of one gravity gradient; a point mass is judged by its osculating orbit of the start."""

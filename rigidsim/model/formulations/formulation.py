@@ -241,6 +241,9 @@ def formulates(variables: Variables) -> Callable[[F], F]:
     return register
 
 
+# --- states that follow the body rates as they are ----------------------------------------------------------
+
+
 @formulates(FORMULATIONS[DEFAULT_FORMULATION])
 class Quaternion(Formulation):
     """q' = q (0, w) / 2."""
@@ -322,6 +325,9 @@ class Rates(Formulation):
 
 
 ANGLES = ["phi", "theta", "psi"]
+
+
+# --- Euler angles -------------------------------------------------------------------------------------------
 
 
 @formulates(FORMULATIONS["euler_angles"])
@@ -434,6 +440,9 @@ def singular_factor(sequence: str, middle: float, functions: Any) -> float:
 MOMENTA = ("p_phi", "p_theta", "p_psi")
 
 
+# --- canonical momenta --------------------------------------------------------------------------------------
+
+
 @formulates(FORMULATIONS["canonical"])
 class Canonical(Formulation):
     """Angles and momenta, of which the body rates are functions."""
@@ -538,6 +547,9 @@ ANGLE_UNIT = 20
 """The angle is carried in units of 2**20 rad, so that it never becomes the largest state (to which step
 control is relative), however often the body has turned.
 """
+
+
+# --- planar motion ------------------------------------------------------------------------------------------
 
 
 @formulates(FORMULATIONS["planar"])

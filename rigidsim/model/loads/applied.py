@@ -160,6 +160,9 @@ class Force(Applied):
         return along_axes(m, 1 / m.carried(m.scene.body.mass), m.scaling.time - m.scaling.speed, found)
 
 
+# --- damping and mass that leaves ---------------------------------------------------------------------------
+
+
 def _against_rates(m: Kinematics, damping: Matrix, factor: Symbolic | None = None) -> list[Term]:
     """Torque -D w of a constant matrix (mpf, kg m^2/s), perhaps times a factor."""
     terms: list[Term] = []

@@ -223,6 +223,8 @@ def _diagonal(elements: list[Any]) -> list[list[Any]]:
     return [[elements[i] if i == j else 0.0 for j in range(3)] for i in range(3)]
 
 
+# --- an elastic body ----------------------------------------------------------------------------------------
+
 Linear = Callable[[list[Any]], list[Any]]
 """A constant tensor times a vector."""
 

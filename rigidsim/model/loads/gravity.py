@@ -167,6 +167,9 @@ def earth_pole(m: Kinematics, epoch: Epoch, axes: str) -> list[Symbolic]:
     return to_ecliptic(equator, (c, s))
 
 
+# --- placed sources -----------------------------------------------------------------------------------------
+
+
 def _of_placement(name: str) -> Any:
     return property(attrgetter(f"placement.{name}"))
 

@@ -281,6 +281,8 @@ def rotors_of(scene: Scene) -> list[Rotor]:
     return [rotor for rotor in scene.tabled.get("rotors", ()) if isinstance(rotor, Rotor)]
 
 
+# --- a fluid core -------------------------------------------------------------------------------------------
+
 STATES = ("core_wx", "core_wy", "core_wz")
 _ROUNDING_OF_INPUT = 1e-14  # relative, of moments that a double-precision program printed
 _MOST_DAMPED = 1e12  # times within a run that friction may take the core to the mantle's rate: as many steps

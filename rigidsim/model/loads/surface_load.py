@@ -227,6 +227,8 @@ def _number(m: Kinematics, value: Any) -> Any:
     return hy.expression(rounded(m.number(value)))
 
 
+# --- pushes on surfaces -------------------------------------------------------------------------------------
+
 Sum = Mapping[Expression, Any]
 """A sum of expressions times coefficients (mpf)."""
 
@@ -407,6 +409,8 @@ class Pushes:
         return self.around.expression(self._title, text, **{"parameters": None, **options})
 
 
+# --- drag ---------------------------------------------------------------------------------------------------
+
 _FALLING = 2.0**-10  # ratio of the least to the largest distance of an orbit that all but meets the centre
 _PLACES = 16  # along an orbit, between which what reads the altitude is smooth
 
@@ -572,6 +576,8 @@ def _falling(fields: DragFields, around: Setting) -> list[Expression]:
     given = {"base": fields.altitude.alone, "scale_height": fields.scale_height.alone}
     return [around.expression("drag", "exp((base - altitude)/scale_height)", parameters=given)]
 
+
+# --- light --------------------------------------------------------------------------------------------------
 
 SPEED_OF_LIGHT = 299792458  # m/s, exact
 _AU = 149597870700  # m, exact (IAU 2012)

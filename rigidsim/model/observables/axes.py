@@ -219,6 +219,9 @@ AXES = (
 )  # fmt: skip
 
 
+# --- rotation about the momentum ----------------------------------------------------------------------------
+
+
 def _andoyer_momenta(m: Mechanics) -> list[Symbolic]:
     momentum, plane = m.momentum_body, reference_plane(m)
     figure = along(m.fixed(m.scene.figure.pole), momentum)
@@ -394,6 +397,9 @@ POLE = (
         attributes=described_by(_NO_SPIN, figure=True),
     ),
 )  # fmt: skip
+
+
+# --- what the climate feels ---------------------------------------------------------------------------------
 
 
 def _source(m: Mechanics) -> Load | None:

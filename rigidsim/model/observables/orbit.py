@@ -144,6 +144,8 @@ RESONANT_ANGLE = continuous_angles(
 )  # fmt: skip
 
 
+# --- point masses -------------------------------------------------------------------------------------------
+
 EACH = ("point_mass", *SPACE)
 
 
