@@ -92,7 +92,7 @@ class Applied(Load):
         return cls((first, second, third), fields.frame, arm, pushes)
 
     def acts(self) -> bool:
-        return not all(_vanishes(component) for component in self.components)
+        return any(not isinstance(x, Constant) or x.value.sign for x in self.components)
 
     @property
     def names(self) -> frozenset[str]:
@@ -116,10 +116,6 @@ class Applied(Load):
         if self.title != "force" or self.frame != "space" or len(found) < 3:
             return None
         return self.arm, [value.at(scene.context) for value in found]
-
-
-def _vanishes(component: Expression) -> bool:
-    return isinstance(component, Constant) and component.value.sign == 0
 
 
 @register_load

@@ -61,6 +61,7 @@ from rigidsim.model.loads.gravity import Attraction
 from rigidsim.model.mechanics import Carrier, Mechanics
 from rigidsim.model.names import written
 from rigidsim.model.own_states import driven, own_blocks
+from rigidsim.model.placements import SourceMotion
 from rigidsim.model.rotations import Symbolic, transpose
 from rigidsim.model.rotations import apply as turned
 from rigidsim.model.scaling import Scaling, source_rate
@@ -230,20 +231,14 @@ Linear = Callable[[list[Any]], list[Any]]
 
 
 @dataclass(frozen=True)
-class SeenTide:
-    """A source that raises tides, in a separate unit of length and internal units of time.
+class SeenTide(SourceMotion):
+    """A source that raises tides; its motion in space is given by components along the body axes.
 
     Attributes:
-        place, velocity, acceleration: of the source in space, as components along the body axes.
-        inverse: 1 / distance.
         lift: k R^5 M' over the unit of length to the third, internal units of inertia.
         pull: 3 G M' over the same, internal units.
     """
 
-    place: list[Any]
-    velocity: list[Any]
-    acceleration: list[Any]
-    inverse: Any
     lift: Any
     pull: Any
 
@@ -621,7 +616,8 @@ class Elasticity(Load, Carrier):
             vectors = motion.place, motion.velocity, motion.acceleration
             place, velocity, acceleration = (turned(transpose(m.matrix), x) for x in vectors)
             lift, pull = (rounded(m.number(x)) for x in self._sizes(load, motion.unit, scaling))
-            tides.append(SeenTide(place, velocity, acceleration, motion.inverse, lift, pull))
+            sizes = motion.inverse, motion.unit, lift, pull
+            tides.append(SeenTide(place, velocity, acceleration, *sizes))
         rigid_body = replace(m, shape=None)
         rigid = ConstantInertia.of(m.numbers, m.number, scene.context)
         *constants, offset = self._constants(scene, scaling.time, scaling.inertia)
@@ -726,7 +722,7 @@ class Elasticity(Load, Carrier):
         for load in self.sources(scene):
             place, velocity, acceleration = (apply(inside, x) for x in load.placement.motion_at_start(scene))
             strength, inverse = load.gravitational_parameter, 1 / norm(context, place)
-            sizes = self.strength * strength, 3 * strength
+            sizes = context.one, self.strength * strength, 3 * strength
             tides.append(SeenTide(place, velocity, acceleration, inverse, *sizes))
         turning, inverse_tensor, massive = scene.turning_inertia, scene.inverse_inertia, scene.body.inertia
         distortion = Distortion(

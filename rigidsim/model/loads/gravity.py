@@ -79,7 +79,7 @@ from rigidsim.scene.arithmetic import Vector, across, cross, dot, norm, parallel
 from rigidsim.scene.bodies.gravity_field import LEAST, MOST, GravityField, HarmonicsTable
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.epochs import J2000, Epoch
-from rigidsim.scene.exact import ZERO, ExactNumber, parse_number
+from rigidsim.scene.exact import ZERO, parse_number
 from rigidsim.scene.fields import (
     NAME_OR_VECTOR,
     Acceleration,
@@ -1032,16 +1032,12 @@ _ON_EARTH = (
 _UPRIGHT = 0.9  # of its size: a pull along Z
 
 
-def _standard_gravity() -> list[ExactNumber]:
-    return [parse_number(a, "m/s^2") for a in ("0", "0", "-9.80665")]
-
-
 class UniformGravityFields(LoadFields):
     """A uniform field: a torque about the fixed point, or free fall in a scene with a position."""
 
     kind: Literal["uniform_gravity"]
     acceleration: Triple[Acceleration] = Field(
-        default_factory=_standard_gravity,
+        default_factory=lambda: [parse_number(a, "m/s^2") for a in ("0", "0", "-9.80665")],
         description="acceleration of free fall, space axes",
         examples=[[0, 0, -3.72]],
         json_schema_extra={"default": [0, 0, -9.80665]},

@@ -464,8 +464,11 @@ class MagneticDipole(InMagneticField):
     @classmethod
     def resolve(cls, fields: MagneticDipoleFields, around: Setting) -> MagneticDipole:
         if any(isinstance(x, str) for x in fields.moment):
-            moment, law = [around.context.zero] * 3, tuple(_law(fields.moment, around))
-            return SteeredDipole.within(fields, around, moment=moment, law=law)
+            law = tuple(
+                Constant(x) if isinstance(x, ExactNumber) else around.expression(f"moment[{i}]", x, "A m^2")
+                for i, x in enumerate(fields.moment)
+            )
+            return SteeredDipole.within(fields, around, moment=[around.context.zero] * 3, law=law)
         return cls.within(fields, around, moment=numbers(fields.moment, around))
 
     def acts(self) -> bool:
@@ -530,12 +533,6 @@ class SteeredDipole(MagneticDipole):
 
     def amplitude(self, scene: Scene) -> Any | None:
         return None
-
-
-def _law(given: list[Any], around: Setting) -> Iterator[Expression]:
-    """Components of a moment, of which some are expressions."""
-    for i, x in enumerate(given):
-        yield Constant(x) if isinstance(x, ExactNumber) else around.expression(f"moment[{i}]", x, "A m^2")
 
 
 Conductivity = Annotated[ExactNumber, InUnit("S/m")]

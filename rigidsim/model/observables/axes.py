@@ -47,7 +47,7 @@ from collections.abc import Callable, Mapping
 
 import heyoka as hy
 
-from rigidsim.model.frames import ReferencePlane, initial_normal, initial_plane, orbit_plane, reference_plane
+from rigidsim.model.frames import initial_normal, initial_plane, orbit_plane, reference_plane
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import (
@@ -57,6 +57,7 @@ from rigidsim.model.observables.observable import (
     Observable,
     continuous_angles,
     described_by,
+    lacking,
     only_when_named,
     same_unit,
 )
@@ -99,10 +100,10 @@ def _meridian(m: Mechanics) -> list[Angle]:
     return [Angle(fz, x * fy - y * fx)]
 
 
-def _no_meridian(m: Mechanics) -> str | None:
-    if m.scene.axes is not None:
-        return None
-    return "it counts from the equator of J2000, but what the space axes are isn't known; set [frame] axes"
+_no_meridian = lacking(
+    lambda m: m.scene.axes,
+    "it counts from the equator of J2000, but what the space axes are isn't known; set [frame] axes",
+)
 
 
 def _sky(convention: str) -> Callable[[Mechanics], Mapping[str, str]]:
@@ -134,15 +135,11 @@ def _turns_about_its_figure(m: Mechanics) -> bool:
     return bool(across <= _AXIAL * aligned) and principal
 
 
-def _moves(load: Load) -> bool:
-    return bool(load.orbit or load.table or load.placement.moves or load.reacts)
-
-
 def is_planet(m: Mechanics) -> bool:
     """Whether a fast spin precesses under gravity gradients of orbiting or ephemeris bodies."""
     if m.attitude is None or not m.turning:
         return False
-    distant = [x for x in m.turning if _moves(x)]
+    distant = [x for x in m.turning if x.orbit or x.table or x.placement.moves or x.reacts]
     fast = norm(m.scene.context, m.scene.angular_velocity) >= _FAST * source_rate(m.scene)
     return len(distant) == len(m.turning) and bool(fast) and _turns_about_its_figure(m)
 
@@ -361,13 +358,11 @@ def _wobble_angle(m: Mechanics) -> list[Symbolic]:
     return [_angle_between(m.fixed(largest), m.momentum_body)]
 
 
-def _no_largest(m: Mechanics) -> str | None:
-    if unique_axis(m.scene.body, m.scene.context, largest=True) is not None:
-        return None
-    return (
-        "the two largest principal moments are equal, so that no single axis has the largest; record "
-        "nutation_angle"
-    )
+_no_largest = lacking(
+    lambda m: unique_axis(m.scene.body, m.scene.context, largest=True),
+    "the two largest principal moments are equal, so that no single axis has the largest; record "
+    "nutation_angle",
+)
 
 
 def _polar_attributes(m: Mechanics) -> Mapping[str, str]:
@@ -407,19 +402,14 @@ def _source(m: Mechanics) -> Load | None:
     return next((load for load in m.loads if load.orbit is not None or load.table is not None), None)
 
 
-def _no_orbit(m: Mechanics) -> str | None:
-    if _source(m) is not None:
-        return None
-    return "no load has an orbit by elements or a table, to which it would refer; leave it out"
-
-
-def _plane(m: Mechanics) -> ReferencePlane:
-    return orbit_plane(m, [m.carried(_source(m))])
+_no_orbit = lacking(
+    _source, "no load has an orbit by elements or a table, to which it would refer; leave it out"
+)
 
 
 def _equinox(m: Mechanics) -> tuple[Symbolic, Symbolic]:
     """Cosine and sine of the equinox's longitude, times the sine of the obliquity."""
-    u, v, _ = _plane(m).components(unit(m.figure_space))
+    u, v, _ = orbit_plane(m, [m.carried(_source(m))]).components(unit(m.figure_space))
     return v, -u
 
 

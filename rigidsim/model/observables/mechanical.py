@@ -59,6 +59,7 @@ from rigidsim.model.observables.observable import (
     Observable,
     continuous_angles,
     described_by,
+    lacking,
     only_when_named,
     same_unit,
     unless,
@@ -513,10 +514,7 @@ def _tip_exponent(m: Mechanics) -> int:
     return m.scaling.length if m.position is not None else 0
 
 
-def _no_tip(m: Mechanics) -> str | None:
-    if tip_point(m) is not None:
-        return None
-    return "nothing says which point; give [output] tip = [x, y, z] in body axes, or"
+_no_tip = lacking(tip_point, "nothing says which point; give [output] tip = [x, y, z] in body axes, or")
 
 
 def _is_top(m: Mechanics) -> bool:
@@ -751,17 +749,13 @@ def _falls_freely(m: Mechanics) -> bool:
     return bool(pulling) and all(load.uniform_field is not None for load in pulling)
 
 
-def _only_if(holds: Callable[[Mechanics], object]) -> Callable[[Mechanics], str | None]:
-    return lambda m: None if holds(m) else "this scene has none"
-
-
 def _momentum_along(name: str, words: str, why: str) -> Observable:
     """Angular momentum along one of the ``kept_axes``."""
     return Observable(
         f"angular_momentum_{name}", (), "kg m2 s-1", f"angular momentum along {words}",
         lambda m: [_along(m, kept_axes(m)[name], m.momentum_space)], same_unit(MOMENTUM, 1), "space axes", (),
         lambda _: f"no load has a torque about {why}", momentum_scale,
-        absent=_only_if(lambda m: m.attitude is not None and name in kept_axes(m)),
+        absent=lacking(lambda m: m.attitude is not None and name in kept_axes(m)),
     )  # fmt: skip
 
 
@@ -770,14 +764,14 @@ TOPS = (
         "kovalevskaya_constant", (), "rad4 s-4", "Kovalevskaya's constant", _kovalevskaya,
         same_unit(lambda m: -4 * m.scaling.time, 1), "", (),
         lambda _: "A = B = 2 C, and the centre of mass lies in the equatorial plane (Kovalevskaya)",
-        _kovalevskaya_scale, absent=_only_if(lambda m: _top(m, 2)),
+        _kovalevskaya_scale, absent=lacking(lambda m: _top(m, 2)),
     ),
     Observable(
         "goryachev_chaplygin_constant", (), "rad3 s-3", "Goryachev's and Chaplygin's constant",
         _goryachev_chaplygin, same_unit(lambda m: -3 * m.scaling.time, 1), "", (),
         lambda _: "A = B = 4 C, the centre of mass lies in the equatorial plane, and L_z = 0 (Goryachev, "
         "Chaplygin)",
-        _goryachev_chaplygin_scale, absent=_only_if(lambda m: _top(m, 4)),
+        _goryachev_chaplygin_scale, absent=lacking(lambda m: _top(m, 4)),
     ),
 )  # fmt: skip
 
@@ -789,19 +783,19 @@ WATCHED = (
         "angular_momentum_across", SPACE, "kg m2 s-1", "angular momentum across its initial direction",
         lambda m: _across(m, _beginning(m), m.momentum_space), same_unit(MOMENTUM, 3), "space axes", (),
         lambda _: "the damping is in proportion to the inertia tensor", momentum_scale,
-        by_default=only_when_named, absent=_only_if(_damped_alike),  # zeros
+        by_default=only_when_named, absent=lacking(_damped_alike),  # zeros
     ),
     Observable(
         "brun_constant", (), "kg2 m4 s-2", "Brun's constant", _brun,
         same_unit(lambda m: 2 * m.scaling.momentum, 1), "", (),
         lambda _: "all torques are gravity gradients of fixed sources (Brun)", _brun_scale,
-        absent=_only_if(_sources_alone),
+        absent=lacking(_sources_alone),
     ),
     Observable(
         "bogoyavlensky_constant", (), "kg2 m4 s-4", "Bogoyavlensky's constant", _bogoyavlensky,
         same_unit(lambda m: 2 * (m.scaling.momentum - m.scaling.time), 1), "", (),
         lambda _: "all torques are gravity gradients of fixed sources (Bogoyavlensky)", _bogoyavlensky_scale,
-        absent=_only_if(_several_directions),
+        absent=lacking(_several_directions),
     ),
     Observable(
         "total_angular_momentum_axial", (), "kg m2 s-1",
@@ -809,12 +803,12 @@ WATCHED = (
         lambda m: [_along(m, m.carried(_line(m)), total_momentum(m))], same_unit(MOMENTUM, 1), "space axes",
         (),
         lambda _: "no load turns the motion about the line of the attracting points", total_momentum_scale,
-        absent=_only_if(_line),
+        absent=lacking(_line),
     ),
     Observable(
         "linear_momentum_horizontal", SPACE, "kg m s-1", "linear momentum across gravity",
         lambda m: _across(m, m.carried(m.numbers.up), linear_momentum(m)),
         same_unit(lambda m: m.scaling.speed + mass_exponent(m), 3), "space axes", (),
-        lambda _: "the only force is uniform gravity", linear_momentum_scale, absent=_only_if(_falls_freely),
+        lambda _: "the only force is uniform gravity", linear_momentum_scale, absent=lacking(_falls_freely),
     ),
 )  # fmt: skip

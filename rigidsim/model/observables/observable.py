@@ -150,6 +150,13 @@ def _without(_: Mechanics) -> None:
     return None
 
 
+def lacking(
+    holds: Callable[[Mechanics], object], why: str = "this scene has none"
+) -> Callable[[Mechanics], str | None]:
+    """``Observable.absent`` of what a scene can't have, and why, where something doesn't hold."""
+    return lambda m: None if holds(m) else why
+
+
 def always(_: Mechanics) -> bool:
     """Record wherever a scene has the quantity, unless the config names what to record."""
     return True

@@ -34,6 +34,7 @@ from rigidsim.model.observables.observable import (
     Angle,
     Observable,
     continuous_angles,
+    lacking,
     same_unit,
 )
 from rigidsim.model.rotations import Symbolic, along
@@ -60,12 +61,6 @@ def libration(m: Mechanics) -> list[Angle]:
     return [Angle(x, z), Angle(along(axis, frame.normal), hy.sqrt(x * x + z * z))]
 
 
-def _no_long_axis(m: Mechanics) -> str | None:
-    if unique_axis(m.scene.body, m.scene.context, largest=False) is not None:
-        return None
-    return "the body has no single axis of smallest moment, whose libration it would be"
-
-
 def _attributes(convention: str) -> Callable[[Mechanics], Mapping[str, str]]:
     return lambda m: {"convention": convention, "local_frame": local_frame(m).described}
 
@@ -74,16 +69,6 @@ def air_velocity(m: Mechanics) -> list[Symbolic]:
     """Velocity relative to the air that turns with the body flown about, body axes, m/s."""
     found = FlightNames().expressions(m, RELATIVE_NAMES)
     return [found[name] for name in RELATIVE_NAMES]
-
-
-def _no_air(m: Mechanics) -> str | None:
-    if flown_about(m.scene.config) is not None:
-        return None
-    return "the body flies about nothing whose air it would meet; give a central_gravity, or leave it out"
-
-
-def _dragged(m: Mechanics) -> bool:
-    return any(isinstance(load, Drag) for load in m.loads)
 
 
 _NEEDS = ("attitude", "source")
@@ -100,7 +85,11 @@ ORBIT = (
     ),
     continuous_angles(
         "libration", ("libration_angle",), "libration of the axis of smallest moment", libration,
-        frame="local frame", needs=_NEEDS, absent=_no_long_axis,
+        frame="local frame", needs=_NEEDS,
+        absent=lacking(
+            lambda m: unique_axis(m.scene.body, m.scene.context, largest=False),
+            "the body has no single axis of smallest moment, whose libration it would be",
+        ),
         attributes=_attributes(
             "angles of the axis of smallest moment from the direction to the source: in the orbit's plane, "
             "positive forward, turns counted; out of it, positive towards the orbit's normal"
@@ -113,7 +102,12 @@ ORBIT = (
     ),
     Observable(
         "air_velocity", BODY, "m s-1", "velocity relative to the air", air_velocity,
-        lambda m: [0, 0, 0], "body axes", ("attitude", "flight"), by_default=_dragged, absent=_no_air,
+        lambda m: [0, 0, 0], "body axes", ("attitude", "flight"),
+        by_default=lambda m: any(isinstance(load, Drag) for load in m.loads),
+        absent=lacking(
+            lambda m: flown_about(m.scene.config),
+            "the body flies about nothing whose air it would meet; give a central_gravity, or leave it out",
+        ),
         attributes=lambda m: {
             "convention": "of the centre of mass, in air that turns at the atmosphere_rate of the load flown "
             "about; the air comes from this direction"
@@ -125,18 +119,14 @@ ORBIT = (
 # --- the angle that a resonance keeps, in motions averaged over rotation and orbit --------------------------
 
 
-def _no_resonance(m: Mechanics) -> str | None:
-    if m.commensurable_angle is not None:
-        return None
-    return (
-        'is of [model] level = "orbit_averaged" where the body is in resonance with its source; leave it out'
-    )
-
-
 RESONANT_ANGLE = continuous_angles(
     "resonant_angle", (), "angle that the rotation keeps with the orbit",
     lambda m: [Angle(*m.carried(m.commensurable_angle))], needs=("attitude",),
-    by_default=lambda m: m.commensurable_angle is not None, absent=_no_resonance,
+    by_default=lambda m: m.commensurable_angle is not None,
+    absent=lacking(
+        lambda m: m.commensurable_angle,
+        'is of [model] level = "orbit_averaged" where the body is in resonance with its source; leave it out',
+    ),
     attributes=lambda m: {
         "convention": "about the angular momentum, at the pericentre: from the direction of the pericentre "
         "to the axis of least moment; 0 or pi where that points at the source there"
