@@ -50,8 +50,6 @@ _LIGHT = 299792458  # m/s
 class AveragedMechanics(Mechanics):
     """Mechanics of an averaged motion; ``rates`` is the rate at which the momentum turns, in space axes."""
 
-    average: Average
-
     @property
     def unit(self) -> Any:
         """Internal unit of time, s (mpf)."""
