@@ -56,7 +56,7 @@ def draw_points(axes: Axes, dataset: xarray.Dataset) -> None:
     axes.set_xlabel("CPU time, relative to double precision in quaternions (measured in the same processes)")
     axes.set_ylabel("largest attitude error, rad")
     axes.margins(0.08)
-    _legend(axes, dataset, short.any())
+    _legend(axes, dataset, short=bool(short.any()))
 
 
 def _draw_others(axes: Axes, dataset: xarray.Dataset) -> None:
@@ -103,7 +103,7 @@ def _look(dataset: xarray.Dataset, n: int) -> tuple[str, str]:
     return _COLORS.get(str(one["precision"].item()), _OTHER), marker
 
 
-def _legend(axes: Axes, dataset: xarray.Dataset, short: bool) -> None:
+def _legend(axes: Axes, dataset: xarray.Dataset, *, short: bool) -> None:
     shown = dataset.isel(setting=np.isfinite(dataset["cpu_ratio"].values))
     precisions, kinds = (set(shown[name].values) for name in ("precision", "formulation"))
     methods = [method_named(str(name)) for name in dict.fromkeys(shown["method"].values)]
