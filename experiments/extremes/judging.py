@@ -14,7 +14,7 @@ import mpmath
 import rigidsim
 from experiments.coverage.judging import Kept, angle, apart, gone_through
 from experiments.extremes.scenes import Extreme, Way
-from rigidsim.accuracy.error_law import round_off_law
+from rigidsim.accuracy.estimates import round_off_law
 from rigidsim.errors import ConfigError
 from rigidsim.scene.cautions import WarningCode
 from rigidsim.session.execution import Diagnostics

@@ -38,7 +38,7 @@ import numpy as np
 
 from rigidsim.accuracy.choice import LEAST_DIGITS, run_pilot
 from rigidsim.accuracy.comparison import Trial, angles_between, trial_scene, try_setting
-from rigidsim.accuracy.error_law import closed_form_if_any
+from rigidsim.accuracy.estimates import closed_form_if_any
 from rigidsim.accuracy.setting import Setting, cost, epsilon, precision_title, precision_titled
 from rigidsim.errors import ConfigError, RigidsimError
 from rigidsim.scene.choices import FORMULATIONS, METHODS

@@ -36,8 +36,7 @@ from rigidsim.accuracy.comparison import (
     trial_scene,
     try_setting,
 )
-from rigidsim.accuracy.error_law import CLOSED_FORM, closed_form_if_any, stable_law
-from rigidsim.accuracy.estimates.estimate import Estimate, estimate_errors
+from rigidsim.accuracy.estimates import CLOSED_FORM, Estimate, closed_form_if_any, estimate_errors, stable_law
 from rigidsim.accuracy.modelling import Unmeasured, measure_modelling
 from rigidsim.accuracy.setting import (
     STEP_SECONDS,

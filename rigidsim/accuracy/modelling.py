@@ -4,7 +4,7 @@ At the beginning, the middle and the end of the span the full motion starts from
 with what averaging removed added back, and both are followed. Their difference is a growth, which the
 averaged motion carries over the span, plus an oscillation, whatever the span. A run that is hardly longer
 than the windows is followed to its end instead. The errors of the integration itself are another matter
-(``rigidsim.accuracy.estimates.estimate``).
+(``rigidsim.accuracy.estimates``).
 """
 
 import math

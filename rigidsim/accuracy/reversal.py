@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigidsim.accuracy.comparison import Collected, angles_between, distances_between
-from rigidsim.accuracy.estimates.estimate import estimate_errors
+from rigidsim.accuracy.estimates import estimate_errors
 from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.model.load import Load
 from rigidsim.model.system import System

@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.accuracy.error_law import CLOSED_FORM
-from rigidsim.accuracy.estimates.estimate import UNCERTAIN, Estimate, estimate_errors, label_rounding
+from rigidsim.accuracy.estimates import CLOSED_FORM, UNCERTAIN, Estimate, estimate_errors, label_rounding
 from rigidsim.accuracy.modelling import Unmeasured, measure_modelling, modelling_of
 from rigidsim.errors import VIEW, ConfigError, StoppedWritingError
 from rigidsim.scene.cautions import Caution, WarningCode

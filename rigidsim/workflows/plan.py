@@ -18,7 +18,7 @@ from rigidsim.accuracy.choice import (
     growth_of,
     run_pilot,
 )
-from rigidsim.accuracy.error_law import closed_form_if_any, held_error, stable_law
+from rigidsim.accuracy.estimates import closed_form_if_any, held_error, stable_law
 from rigidsim.accuracy.modelling import Unmeasured, measure_modelling
 from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.average import reads_rates_alone

@@ -8,7 +8,7 @@ from support import run_estimated as run_text
 
 import rigidsim
 from rigidsim.accuracy.comparison import Collected, try_setting
-from rigidsim.accuracy.estimates.estimate import UNCERTAIN, estimate_errors
+from rigidsim.accuracy.estimates import UNCERTAIN, estimate_errors
 from rigidsim.accuracy.setting import Setting
 from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.solve.problem import prepare

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.accuracy.estimates.members import MemberErrors, MemberEstimates
+from rigidsim.accuracy.estimates import MemberErrors, MemberEstimates
 from rigidsim.errors import ConfigError, MemberError, Problem, RigidsimError
 from rigidsim.model.tangents import GROWTH
 from rigidsim.scene.cautions import WarningCode
@@ -499,7 +499,7 @@ class BatchTiles:
             run = BatchRun(family)
             run.compile()
             if self._estimated:
-                MemberEstimates(family, run.width).compile()
+                MemberEstimates(family, run.width)
 
     def run(
         self, members: Sequence[int], keep: Sequence[str], alone: bool | None = None

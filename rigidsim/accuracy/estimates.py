@@ -1,4 +1,4 @@
-"""Estimate of a run's errors until its end.
+"""Estimates of errors until the end, of a run and of the members of a sweep; and the laws of good integrations.
 
 Samples are held against a better solution where there is one at little cost: the closed form; where tolerance
 or precision are coarse enough, the same motion at a tighter tolerance in double precision; where the states
@@ -12,6 +12,8 @@ With the assumptions below the errors of the campaign's scenes are covered as ``
 (``experiments/error_coverage.py``).
 """
 
+from __future__ import annotations
+
 import math
 import sys
 from collections.abc import Callable, Iterator
@@ -22,10 +24,11 @@ from functools import cached_property
 import heyoka as hy
 import numpy as np
 
-from rigidsim.accuracy.error_law import CLOSED_FORM, closed_form_if_any, stable_law
 from rigidsim.model.system import System, projected_invariants
+from rigidsim.scene.scene import Scene
 from rigidsim.scene.transitions import acts_at_moments_alone
-from rigidsim.solve.closed_form import ClosedForm
+from rigidsim.solve.batch.family import BatchBlock, Family
+from rigidsim.solve.closed_form import ClosedForm, NoClosedForm, closed_form_of
 from rigidsim.solve.compiled import compiled_function, evaluate_rows, interruptible
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.effects.waypoints import SampleTrail, Waypoint, Waypoints
@@ -36,9 +39,12 @@ from rigidsim.solve.error_tangents import (
     LaneCarrier,
     Measures,
     Perturbations,
+    Spread,
     Starts,
     SteppedCarrier,
+    timed,
 )
+from rigidsim.solve.lanes import BatchEngine
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
 from rigidsim.solve.projection import LATE, steps_between
@@ -46,6 +52,63 @@ from rigidsim.solve.stepper import OwnErrors
 from rigidsim.solve.switching.stepper import stepper_of
 from rigidsim.solve.tangents import jacobian_rows
 from rigidsim.solve.taylor_stepper import TaylorStepper
+
+# --- laws ---------------------------------------------------------------------------------------------------
+
+CLOSED_FORM = 50.0
+"""In eps: error of a sample from a closed form, thirty operations and sines right to 4 ulp, at any time."""
+
+
+def round_off_law(tolerance: float, steps: int, rate: float, duration: float) -> float:
+    """Attitude error (rad) of a good integration: (eps / 2) sqrt(steps) |w| t / sqrt 3.
+
+    Rounding lets the frequencies wander as a random walk, and the phase integrates the walk (Brouwer 1937).
+    Motions near an unstable axis amplify errors further: see ``rigidsim.accuracy.choice``.
+    """
+    return tolerance / 2 * math.sqrt(max(steps, 1)) * rate * duration / math.sqrt(3)
+
+
+def stable_law(tolerance: float, steps: int, rate: float, duration: float) -> float:
+    """Attitude error (rad) of a motion that amplifies none: the round-off law and the attitude's own walk.
+
+    The law is one of phases that many radians have gathered. A motion of less than some radians, as a slow
+    precession often is, shows what each step does to the attitude itself: four components of a unit
+    quaternion, each off by eps / 2 of itself, turn it by eps at most, which add up as a random walk.
+    """
+    walk = tolerance * math.sqrt(max(steps, 1))
+    return math.hypot(walk, round_off_law(tolerance, steps, rate, duration))
+
+
+def held_error(
+    prepared: InitialValueProblem, steps: int, rate: float, seconds: float, amplification: float
+) -> float:
+    """The law of stable motions times the motion's amplification, rad, where invariants are projected on the
+    way, of a motion whose frequencies depend on them alone (one with a closed form); never above the plain
+    run's.
+
+    Corrections k steps apart leave the frequencies off by the wander in between, eps sqrt(k), whose part over
+    the ends is taken back: eps k sqrt(n / 12) after n steps. Where they begin late, what rounding did to the
+    phase until then comes on top.
+    """
+    level = prepared.law_tolerance
+    plain = stable_law(level, steps, rate, seconds) * amplification
+    late = prepared.holds_late
+    if not prepared.holds_invariants or steps <= (LATE if late else 0):
+        return plain
+    between = steps_between(prepared.precision, late=late)
+    begun = round_off_law(level, LATE, rate, seconds * LATE / steps) if late else 0.0
+    return min(plain, (begun + level * between * math.sqrt(steps / 12)) * amplification)
+
+
+def closed_form_if_any(scene: Scene, *, driven: bool = False) -> tuple[ClosedForm | None, str]:
+    """The closed form of a scene's motion, or None and the reason why there is none."""
+    try:
+        return closed_form_of(scene, driven=driven), ""
+    except NoClosedForm as none:
+        return None, str(none)
+
+
+# --- a single run -------------------------------------------------------------------------------------------
 
 DOUBLE = float(np.finfo(float).eps)
 _LARGEST_EXPONENT = 600.0  # keeps products within doubles
@@ -607,3 +670,141 @@ def _exponential_growth(times: np.ndarray, errors: np.ndarray) -> tuple[float, f
     if rate > 0 and gone >= len(times):
         seconds += math.log(UNCERTAIN / largest[last]) / rate
     return max(rate, 0.0), seconds
+
+
+# --- members of a sweep -------------------------------------------------------------------------------------
+
+_BEGUN_ANEW = 16  # times at most
+_STRETCHES = 6
+_LANES = 8
+"""Least number of lanes: a step of eight in vectors of four costs 1.6 of one of four."""
+_BY_CHANCE = 8.0
+"""Tolerance in epsilons up to which a step's error is mostly random rounding."""
+_MORE_STEPS = 4
+
+
+@dataclass(frozen=True)
+class MemberErrors:
+    """Largest errors of members until their last samples, (members,), in the units of ``Estimate``; nan for
+    those that have none.
+    """
+
+    attitude: np.ndarray | None
+    rates: np.ndarray
+    position: np.ndarray | None
+    velocity: np.ndarray | None
+
+    @property
+    def uncertain(self) -> np.ndarray:
+        """Mask of the members whose digits are gone."""
+        return (self.rates if self.attitude is None else self.attitude) > UNCERTAIN
+
+
+class MemberEstimates:
+    """Estimates for a family's members, from tangents of their motions, with the perturbations and margins of
+    single runs; what they need is compiled beforehand.
+
+    Each member is followed over all of its motion, which begins anew at some of its samples. Where the
+    tolerance lets steps be wrong by more than rounding does, members are run again at a tighter one and
+    compared at their samples, which costs no more than tangents would, and is no question of chance.
+    """
+
+    def __init__(self, family: Family, width: int) -> None:
+        self._family = family
+        self._system, self._prepared = family.system, family.prepared
+        self._epsilon = float(self._prepared.precision.epsilon)
+        self._measures = Measures(self._system, family.moving, family.variables)
+        loose = float(self._prepared.effective_tolerance)
+        self._by_chance = loose <= _BY_CHANCE * self._epsilon  # whether errors come mainly from rounding
+        rights = family.as_parameters([right for _, right in family.system.equations[: family.moving]])
+        equations = zip(family.system.variables, timed(rights, len(family.in_equations)), strict=False)
+        tolerance = _TOLERANCE if self._by_chance else loose * _BETTER
+        compact = family.system.wide
+        self._engine = BatchEngine(list(equations), max(width, _LANES), tolerance=tolerance, compact=compact)
+
+    def of(self, block: BatchBlock) -> MemberErrors:
+        """Errors of a block's members."""
+        ran = np.array([status is not None for status in block.status]) & (block.reached > 0)
+        some = np.flatnonzero(ran)
+        found = np.full((4, len(ran)), np.nan)
+        if len(some):
+            found[:, some] = self._errors(block, some)
+        attitude, rates, position, velocity = found
+        flies = "x" in self._system.states
+        carried = self._measures.carried
+        return MemberErrors(
+            attitude if carried else None, rates, position if flies else None, velocity if flies else None
+        )
+
+    def _errors(self, block: BatchBlock, some: np.ndarray) -> np.ndarray:
+        family, system = self._family, self._system
+        places, scaling = block.places[some], system.scaling
+        units = family.whole_numbers(scaling.time)[places]
+        seconds = block.times[block.reached[some] - 1]
+        begin_seconds = float(self._prepared.scene.start)
+        way = self._prepared.scene.samples.direction
+        begin, duration = way * np.ldexp(begin_seconds, -units), way * (seconds - begin_seconds)
+        exponents = [
+            family.whole_numbers(system.state_exponents[place])[places]
+            for place in self._measures.places["rates"]
+        ]
+        starts = Starts(
+            family.initial[: family.moving, places],
+            begin,
+            begin + np.ldexp(duration, -units),
+            block.steps[some],
+            np.ldexp(1.0, np.array(exponents, dtype=np.int64).reshape(-1, len(places))),
+            family.parameters[:, places],
+        )
+        by_chance = self._by_chance
+        spread = self._followed(block, some, starts) if by_chance else self._compared(block, some, starts)
+        label = LABEL * self._epsilon * np.maximum(abs(begin_seconds), np.abs(seconds))
+        pace = family.doubles(system.rate_bound)[places]
+        level = SAFETY * self._epsilon if by_chance else COMPARED
+        last, path = LAST_BITS * self._epsilon, PATH if by_chance else 1.0
+        with np.errstate(over="ignore"):
+
+            def at_end(name: str, size: np.ndarray | float, most: np.ndarray | float) -> np.ndarray:
+                found = spread.largest(name)
+                known = spread.whole & np.isfinite(found)
+                return np.where(known, np.minimum(level * found + size, most), most)
+
+            attitude = at_end("attitude", last + label * pace, math.pi)
+            rates = at_end("rates", last, 2.0)
+            extent, fastest = spread.largest("distance"), spread.largest("speed")
+            moved = last * extent + np.ldexp(label, -units) * fastest
+            position = path * at_end("position", moved, AS_LARGE * extent)
+            velocity = path * at_end("velocity", last * fastest, AS_LARGE * fastest)
+        length, speed = (family.whole_numbers(e)[places] for e in (scaling.length, scaling.speed))
+        return np.array([attitude, rates, np.ldexp(position, length), np.ldexp(velocity, speed)])
+
+    def _compared(self, block: BatchBlock, some: np.ndarray, starts: Starts) -> Spread:
+        """Distance of members from runs at a tighter tolerance."""
+        read = starts.parameters[self._family.in_equations]
+        most = _MORE_STEPS * int(starts.steps.max()) + 1000
+        moments = block.moments[:, some]
+        read = np.concatenate([read, np.zeros((1, len(some)))])
+        there = self._engine.run(starts.states, read, starts.begin, moments, most).states
+        spread = Spread(len(some))
+        for row, (state, apart) in enumerate(zip(there, block.states[:, :, some] - there, strict=True)):
+            known = np.flatnonzero(block.reached[some] > row)
+            away = apart[:, known, None]
+            spread.note(known, **self._measures.differences(state[:, known], away, starts, known))
+        return spread
+
+    def _followed(self, block: BatchBlock, some: np.ndarray, starts: Starts) -> Spread:
+        epsilon, read = self._epsilon, starts.parameters[self._family.in_equations]
+        carrier = LaneCarrier(self._engine, read, starts)
+        loose = max(self._prepared.effective_tolerance / epsilon, 1.0)
+        errors = plain_perturbations(self._prepared.system, loose)
+        rows = np.unique(np.linspace(0, len(block.moments) - 1, _BEGUN_ANEW + 2).astype(int)[1:-1])
+        times, states = (
+            block.moments[np.ix_(rows, some)],
+            block.states[:, : self._family.moving][rows][:, :, some],
+        )
+        unknown = ~np.isfinite(states).all(axis=1) | (rows[:, None] >= block.reached[some])
+        known = Known(np.where(unknown, np.nan, times), states)
+        tangents = ErrorTangents(
+            carrier, self._measures, starts, errors, epsilon, known=known, stretches=_STRETCHES
+        )
+        return tangents.follow(lost=math.pi / epsilon)
