@@ -1,4 +1,4 @@
-"""Estimates of errors until the end, of a run and of the members of a sweep; and the laws of good integrations.
+"""Estimates of errors until the end, of a run and of a sweep's members; and the laws of good integrations.
 
 Samples are held against a better solution where there is one at little cost: the closed form; where tolerance
 or precision are coarse enough, the same motion at a tighter tolerance in double precision; where the states
