@@ -26,7 +26,7 @@ import numpy as np
 
 from rigidsim.model.system import System, projected_invariants
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.transitions import acts_at_moments_alone
+from rigidsim.scene.surfaces import acts_at_moments_alone
 from rigidsim.solve.batch.family import BatchBlock, Family
 from rigidsim.solve.closed_form import ClosedForm, NoClosedForm, closed_form_of
 from rigidsim.solve.compiled import compiled_function, evaluate_rows, interruptible

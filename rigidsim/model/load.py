@@ -25,7 +25,7 @@ from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.registry import SceneLoad
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.transitions import narrow_parts, root_parts
+from rigidsim.scene.surfaces import narrow_parts, root_parts
 from rigidsim.scene.validation_messages import shown
 
 Term = tuple[Vector, Symbolic]

@@ -35,8 +35,7 @@ from rigidsim.scene.choices import AUTO, variables_named
 from rigidsim.scene.expressions.tree import states_read
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.surfaces import surfaces_of
-from rigidsim.scene.transitions import happens_at_a_moment
+from rigidsim.scene.surfaces import happens_at_a_moment, surfaces_of
 
 _SAME_BODY = 1e-3  # relative difference of gravitational parameters below which two sources are taken as one
 

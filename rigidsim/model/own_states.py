@@ -23,8 +23,7 @@ from rigidsim.scene.expressions.names import BODY_NAMES, RATE_NAMES, NameProvide
 from rigidsim.scene.expressions.tree import Expression, ExpressionError, evaluate, names_used
 from rigidsim.scene.scene import Scene, start_values
 from rigidsim.scene.schema import Config
-from rigidsim.scene.surfaces import changes, random_states
-from rigidsim.scene.transitions import narrow_parts
+from rigidsim.scene.surfaces import changes, narrow_parts, random_states
 
 _TO_AND_FRO, _ONWARD = 6, 10
 """Binary exponents of the units of time over which a state adds up its derivative if nothing brings it back:

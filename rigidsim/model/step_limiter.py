@@ -29,7 +29,7 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.expressions.names import EULER_NAMES
 from rigidsim.scene.expressions.tree import names_used
-from rigidsim.scene.transitions import WIDE, narrow_parts, root_parts
+from rigidsim.scene.surfaces import WIDE, narrow_parts, root_parts
 
 PACE = "pace"
 _POLE = 2.0**20  # over the factor that vanishes in a pole of the Euler angles

@@ -36,8 +36,8 @@ from rigidsim.scene.expressions.names import EULER_NAMES
 from rigidsim.scene.expressions.tree import bounds
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
-from rigidsim.scene.own_states import OwnState
 from rigidsim.scene.registry import OBSERVABLES
+from rigidsim.scene.scene import OwnState
 
 
 @dataclass(frozen=True)

@@ -1,33 +1,42 @@
-"""Scenes: a config with every number worked out and every physical contradiction refused."""
+"""Scenes: a config with every number worked out and every physical contradiction refused.
+
+Principal moments may be functions of time, [[states]] and [parameters]; the scene's body is the one at the
+start. States of [[states]] are carried by need: recorded, or read by a load, an event or a carried one.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene import schema, starts
-from rigidsim.scene.arithmetic import Matrix, Vector, context_for
+from rigidsim.errors import ConfigError, Problem, ensure
+from rigidsim.scene import starts, units
+from rigidsim.scene.arithmetic import Matrix, Vector, context_for, cross, diagonal, dot, eigen
 from rigidsim.scene.bodies.body import RigidBody, build_body, inverse_inertia
 from rigidsim.scene.bodies.gravity_field import asked_degree, gravity_field_of
 from rigidsim.scene.bodies.outside import surfaces_of, with_surfaces
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.expressions.names import EULER_NAMES, PROVIDERS, names_of
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.expressions.names import EULER_NAMES, PROVIDERS, Names, names_of
+from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import (
+    Constant,
     Expression,
     ExpressionError,
     evaluate,
     names_used,
+    states_read,
 )
 from rigidsim.scene.frame import figure_of, reference_normal
 from rigidsim.scene.kernels.ephemeris import host_of, resolve_ephemeris
-from rigidsim.scene.moving_moments import moments_at_start
-from rigidsim.scene.own_states import OwnState, carried_states, resolve_states
 from rigidsim.scene.point_masses import resolve_point_masses
 from rigidsim.scene.registry import LOADS, SceneLoad, Setting
-from rigidsim.scene.rotors import turning_inertia
 from rigidsim.scene.sample_times import SampleTimes, sample_times
+from rigidsim.scene.schema import Config
+from rigidsim.scene.swept import plain
+from rigidsim.scene.units import UnitError
 
 if TYPE_CHECKING:
     from rigidsim.scene.kernels.spice import Orientation
@@ -69,7 +78,7 @@ class Scene(Setting):
         found_start: how an equilibrium was found that it starts from; None for any other start.
     """
 
-    config: schema.Config
+    config: Config
     samples: SampleTimes
     loads: tuple[Any, ...]
     given_loads: tuple[Any, ...] = ()
@@ -174,9 +183,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
         raise error.at(source) from None
 
 
-def _setting(
-    config: schema.Config, context: Any, body: RigidBody, span: tuple[Any, Any], source: str
-) -> Setting:
+def _setting(config: Config, context: Any, body: RigidBody, span: tuple[Any, Any], source: str) -> Setting:
     position, velocity = _translation(config, body, context)
     axes, epoch, table = config.frame.axes, config.time.epoch, config.body
     ephemeris = resolve_ephemeris(config.ephemeris, axes, epoch, span, source)
@@ -284,7 +291,7 @@ def _orientation(setting: Setting, source: str) -> Orientation | None:
     return resolve_orientation(*asked, host, setting.axes, setting.epoch, span, source)
 
 
-def _body_at_start(config: schema.Config, context: Any) -> RigidBody:
+def _body_at_start(config: Config, context: Any) -> RigidBody:
     moments = moments_at_start(config, context, config.time.start.at(context))
     body = build_body(config.body, context, config.integrator.euler_sequence, moments)
     outside = surfaces_of(config.body.surfaces, body.center_of_mass, context)
@@ -303,7 +310,7 @@ def _fail(table: str, key: str, text: str) -> ConfigError:
     return ConfigError(Problem(f"[{table}] {key}".strip(), text))
 
 
-def _translation(config: schema.Config, body: RigidBody, context: Any) -> tuple[Vector | None, Vector | None]:
+def _translation(config: Config, body: RigidBody, context: Any) -> tuple[Vector | None, Vector | None]:
     if not config.initial.flies:
         if config.initial.frame is not None:
             raise _fail("initial", "frame", "given without position or velocity, which it is of; add them")
@@ -318,6 +325,193 @@ def _translation(config: schema.Config, body: RigidBody, context: Any) -> tuple[
     if body.mass is None:
         raise _fail("body", "mass", "missing; a body with a position or velocity needs it")
     return starts.flight_start(config, context)
+
+
+# --- moments given as expressions ---------------------------------------------------------------------------
+
+_MOMENTS = "[body] principal_moments"
+_LEAST = 1e-9
+"""Least part of their sum that a moment which varies may become: 1/I has a pole at zero."""
+_LEAST_SINGLE = 2e-4
+_JUMPS = re.compile(r"\b(sign|step|pulse|wrap)\s*\(")
+
+
+def least_part(precision: str | int) -> float:
+    """``_LEAST`` in a precision that resolves it."""
+    return _LEAST_SINGLE if precision == "single" else _LEAST
+
+
+def formulas_of(config: Config, names: Names | None = None) -> list[Expression]:
+    """The three moments, parsed where the config has expressions; empty if none is one.
+
+    Raises:
+        ConfigError: an expression that can't be read, jumps, or reads what moments can't.
+    """
+    given = config.body.principal_moments
+    if given is None or all(isinstance(x, ExactNumber) for x in given):
+        return []
+    names = names_of(config) if names is None else names
+    allowed = {"t", *(state.name for state in config.states)}
+    found: list[Expression] = []
+    for axis, text in enumerate(given):
+        if isinstance(text, ExactNumber):
+            found.append(Constant(text))
+            continue
+        where = f"{_MOMENTS}[{axis}]"
+        try:
+            formula = parse_expression(text, names, parameters=config.parameters, unit="kg m^2", where=where)
+            others = ", ".join(sorted(names_used(formula) - allowed))
+            what = f"it reads {others}; moments may read t, [[states]] and [parameters]"
+            ensure(not others, ExpressionError(f"{what}: let a state of [[states]] follow it"))
+            what = "it jumps, and mass takes time to move; make the change smooth with tanh"
+            ensure(
+                not _JUMPS.search(text), ExpressionError(f"{what}, or let a state of [[states]] follow it")
+            )
+        except ExpressionError as error:
+            said = f'given "{text}", which is no number and no expression that is allowed here: {error}'
+            raise ConfigError(Problem(where, said)) from None
+        found.append(formula)
+    return found
+
+
+def moments_at_start(config: Config, context: Any, start: Any) -> Vector | None:
+    """The three moments at the start (mpf, kg m^2); None if all are plain numbers.
+
+    Raises:
+        ConfigError: as ``formulas_of``, or one has no finite value there, or is too small to vary.
+    """
+    values = {"t": start, **{state.name: state.initial.at(context) for state in config.states}}
+    moments = []
+    for axis, formula in enumerate(found := formulas_of(config)):
+        try:
+            moments.append(evaluate(formula, values, context))
+        except ExpressionError as error:
+            raise ConfigError(
+                Problem(f"{_MOMENTS}[{axis}]", f"no finite value at the start: {error}")
+            ) from None
+    if names_used(*found):
+        least = least_part(config.integrator.precision)
+        for axis, moment in enumerate(moments):
+            what = (
+                f"given {context.nstr(moment, 6)} kg m^2 at the start, with moments that vary; each has to "
+            )
+            fault = Problem(f"{_MOMENTS}[{axis}]", what + f"be more than {least:.1g} of their sum")
+            ensure(not 0 <= moment <= least * sum(moments), ConfigError(fault))
+    return moments or None
+
+
+# --- user-defined states ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class OwnState:
+    """A user-defined state that is carried; ``why`` says by whom it is needed."""
+
+    name: str
+    unit: str | None  # SI; "1" for a number, None if it isn't known
+    initial: Any  # mpf
+    derivative: Expression  # SI
+    why: str = ""
+
+    @property
+    def described(self) -> str:
+        """What it is, in a reader's terms."""
+        start = f"{float(self.initial):.4g}" + ("" if self.unit in (None, "1") else f" {self.unit}")
+        return f'state {self.name}: from {start}, changes by "{self.derivative.text}"'
+
+
+def resolve_states(setting: Setting) -> list[OwnState]:
+    """All states of the config, their derivatives parsed.
+
+    Raises:
+        ConfigError: an expression that can't be read, or another dimension than the unit's.
+    """
+    found = []
+    for number, table in enumerate(setting.config.states):
+        here, start = setting.at("states", number), table.initial
+        if start.unit and table.unit is not None:
+            try:
+                units.conversion(start.unit, table.unit)
+            except UnitError as error:
+                raise here.fault("initial", f"given a value in {start.unit}; {error}") from None
+        rate = None if table.unit is None else "s^-1" if table.unit == "1" else f"{table.unit}/s"
+        derivative = here.expression("derivative", table.derivative, rate, read_too=True)
+        found.append(OwnState(table.name, table.unit, start.at(setting.context), derivative))
+    return found
+
+
+def carried_states(
+    states: Sequence[OwnState], readers: Iterable[tuple[str, Expression]], record: Sequence[str] | None
+) -> tuple[OwnState, ...]:
+    """Those that something needs.
+
+    Args:
+        readers: who reads, for ``plan``, and what.
+        record: names of what is recorded; None for all that the scene has.
+    """
+    slopes = {state.name: state.derivative for state in states}
+    why: dict[str, dict[str, None]] = {x: {"recorded": None} for x in slopes if record is None or x in record}
+    waiting = [*readers, *((f"state {name}", slopes[name]) for name in why)]
+    for who, expression in waiting:
+        for name in sorted(states_read(expression) & set(slopes)):
+            if who == f"state {name}":
+                continue
+            if name not in why:
+                waiting.append((f"state {name}", slopes[name]))
+            why.setdefault(name, {})[f"{who} reads it"] = None
+    return tuple(replace(x, why="; ".join(why[x.name])) for x in states if x.name in why)
+
+
+# --- what turns with the body -------------------------------------------------------------------------------
+
+_ROUNDING_OF_INPUT = 1e-14  # relative, of moments that a double-precision program printed
+
+
+def turning_inertia(context: Any, body: RigidBody, apart: Sequence[Matrix]) -> tuple[Matrix, Matrix]:
+    """Tensor of what turns with the body, its own less the tensors of what turns ``apart``, and its inverse:
+    by elements, so that numbers of a sweep stay in it.
+
+    Raises:
+        ConfigError: no body has such a tensor.
+    """
+    tensor = body.inertia
+    for other in apart:
+        tensor = [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(tensor, other, strict=True)]
+    half = sum((tensor[i][i] for i in range(3)), context.zero) / 2
+    spread = [[(half if i == j else context.zero) - tensor[i][j] for j in range(3)] for i in range(3)]
+    size = context.maximum([abs(x) for row in body.inertia for x in row])
+    slack = context.mpf(_ROUNDING_OF_INPUT)
+    fits = all(minor >= -slack * size**order for order, minor in _minors(spread))
+    if not (fits and all(minor > slack * size**order for order, minor in _minors(tensor))):
+        moments, _ = eigen(context, [[plain(x) for x in row] for row in tensor])
+        listed = ", ".join(context.nstr(x, 8) for x in moments)
+        what = (
+            "given moments that the body's own tensor can't include: without the rotors' moments about their "
+            f"axes it would have the principal moments {listed} kg m^2, which no body has (all are positive, "
+            "and none is more than the sum of the others); make the rotors smaller, or add their tensors, "
+            "as of locked wheels, to the tensor of [body]"
+        )
+        raise ConfigError(Problem("[[rotors]] moment", what))
+    return tensor, _inverse(context, tensor)
+
+
+def _minors(m: Matrix) -> list[tuple[int, Any]]:
+    """(order, value) of all principal minors of a symmetric matrix."""
+    pairs = [(0, 1), (1, 2), (0, 2)]
+    return [
+        *((1, m[i][i]) for i in range(3)),
+        *((2, m[i][i] * m[j][j] - m[i][j] ** 2) for i, j in pairs),
+        (3, dot(m[0], cross(m[1], m[2]))),
+    ]
+
+
+def _inverse(context: Any, m: Matrix) -> Matrix:
+    """Inverse of a symmetric matrix: its adjugate over the determinant."""
+    if all(m[i][j] == 0 for i in range(3) for j in range(3) if i != j):
+        return diagonal([1 / m[i][i] for i in range(3)])
+    rows = [cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])]
+    determinant = dot(m[0], rows[0])
+    return [[x / determinant for x in row] for row in rows]
 
 
 # --- its expressions at the start: those without a finite value are refused before anything runs ------------

@@ -25,9 +25,10 @@ from pydantic import (
     model_validator,
 )
 
+from rigidsim.scene import units
 from rigidsim.scene.bodies.table import Body
 from rigidsim.scene.choices import AUTO, DEFAULT_METHOD, FORMULATIONS, METHODS, REDUCED
-from rigidsim.scene.exact import ExactNumber, parse_number
+from rigidsim.scene.exact import ZERO, ExactNumber, parse_number
 from rigidsim.scene.expressions.names import BODY_NAMES
 from rigidsim.scene.expressions.tree import RESERVED
 from rigidsim.scene.fields import (
@@ -36,13 +37,17 @@ from rigidsim.scene.fields import (
     BodyName,
     ConfigTable,
     Dimensionless,
+    Direction,
     EachOnce,
     ElementLines,
     EulerSequence,
+    Formula,
     Four,
     Irradiance,
     Metre,
+    Moment,
     Momentum,
+    NotNegative,
     NotZero,
     OneOf,
     Pair,
@@ -61,11 +66,10 @@ from rigidsim.scene.fields import (
 )
 from rigidsim.scene.frame import Frame
 from rigidsim.scene.kernels.ephemeris import EphemerisTable
-from rigidsim.scene.own_states import OwnStateTable
 from rigidsim.scene.point_masses import PointMassBody
 from rigidsim.scene.registry import LOADS, OBSERVABLES, LoadFields
-from rigidsim.scene.rotors import RotorTable
 from rigidsim.scene.sample_times import Time
+from rigidsim.scene.units import UnitError
 from rigidsim.scene.validation_messages import shown
 
 _FOLDER_NAME = "^[A-Za-z0-9._-]{1,100}$"
@@ -547,6 +551,70 @@ class FitTable(ConfigTable):
                 'prior."KEY" = {sigma = ...}'
             )
         return self
+
+
+class RotorTable(ConfigTable):
+    """A wheel in the body, symmetric about its axis, whose momentum is in every total. The body's own tensor
+    includes it as if it were locked.
+    """
+
+    name: VariableName = Field(examples=["wheel"])
+    """letters, digits and underscores, beginning with a letter; rate_NAME in expressions is its rate"""
+    axis: Direction = Field(examples=[[0, 0, 1]])
+    """direction of its axis, body axes; any length"""
+    moment: NotNegative[Moment] = Field(examples=["0.01 kg m^2"])
+    """moment of inertia about its axis"""
+    rate: Rate = Field(ZERO, examples=["300 rad/s", "3000 rpm"])
+    """rate about its axis relative to the body, at the start"""
+    torque: Formula | None = Field(None, examples=["-k*wz"])
+    """torque of its motor on it, N m: an expression of t, the state and [parameters]; its reaction acts on
+    the body; without it the rotor turns freely
+    """
+    fixed: StrictBool = False
+    """a motor keeps the rate, whatever torque that takes"""
+
+
+_NUMBER = ("", "1")
+"""Units of a pure number."""
+
+
+class OwnStateTable(ConfigTable):
+    """``[[states]]``: a user-defined state, integrated with the motion and readable in every expression."""
+
+    name: VariableName = Field(examples=["integral"])
+    """its name in expressions, and of its variable in the dataset"""
+    initial: AnyQuantity = Field(ZERO, json_schema_extra={"x-unit-key": "unit"})
+    """value at the start, SI or with its unit"""
+    unit: StrictStr | None = Field(None, examples=["rad", "N m s"])
+    """its SI unit, "1" for a number: labels the dataset, and is checked in its derivative and where it
+    is read
+    """
+    derivative: Formula = Field(examples=["wz", "(2*k*qz - torque)/(2 s)"])
+    """its rate of change in SI: an expression of t, the state, [[states]] and [parameters]"""
+
+    @field_validator("name")
+    @classmethod
+    def _free(cls, value: str) -> str:
+        if value in BODY_NAMES or value in RESERVED:
+            raise refuse(f'given "{value}", which expressions use already; rename it')
+        return value
+
+    @field_validator("unit")
+    @classmethod
+    def _in_si(cls, value: str | None) -> str | None:
+        if value is None:
+            return None
+        if value in _NUMBER:
+            return "1"
+        try:
+            factor, pi_power = units.to_si(value)
+        except UnitError as error:
+            raise refuse(f"given {shown(value)}: {error}") from None
+        if factor != 1 or pi_power:
+            found = units.powers(value)
+            instead = units.unit_text(found) if found else "rad"
+            raise refuse(f'given "{value}"; states are in SI: "{instead}" is allowed')
+        return value
 
 
 class Config(ConfigTable):

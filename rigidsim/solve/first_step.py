@@ -13,7 +13,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.system import System
 from rigidsim.scene.expressions.tree import evaluate, names_used
 from rigidsim.scene.scene import Scene, start_values
-from rigidsim.scene.transitions import root_parts
+from rigidsim.scene.surfaces import root_parts
 from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.precision import Precision
 

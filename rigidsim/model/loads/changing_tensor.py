@@ -73,11 +73,10 @@ from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import Expression, ExpressionError, evaluate, names_used, states_read
 from rigidsim.scene.kernels.reading import RelativeEphemeris
-from rigidsim.scene.moving_moments import formulas_of, least_part
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.readable import span_text
 from rigidsim.scene.registry import EffectPart, Setting, names_of, register_load
-from rigidsim.scene.scene import Scene, start_values
+from rigidsim.scene.scene import Scene, formulas_of, least_part, start_values
 from rigidsim.scene.schema import Config
 from rigidsim.scene.swept import plain
 from rigidsim.scene.validation_messages import nearest

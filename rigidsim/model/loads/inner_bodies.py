@@ -55,9 +55,8 @@ from rigidsim.scene.expressions.tree import Expression, states_read
 from rigidsim.scene.frame import unique_axis
 from rigidsim.scene.readable import value_text
 from rigidsim.scene.registry import EffectPart, Setting, register_load
-from rigidsim.scene.rotors import RotorTable
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.schema import Config
+from rigidsim.scene.schema import Config, RotorTable
 from rigidsim.scene.swept import plain
 
 

@@ -72,8 +72,8 @@ from rigidsim.scene.readable import length_text, value_text
 from rigidsim.scene.registry import EffectPart, LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene, start_values
 from rigidsim.scene.schema import Config
+from rigidsim.scene.surfaces import WIDE, narrow_parts, root_parts
 from rigidsim.scene.swept import plain
-from rigidsim.scene.transitions import WIDE, narrow_parts, root_parts
 
 NRLMSISE = "nrlmsise00"
 AIR_DENSITY = "air_density"
