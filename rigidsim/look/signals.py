@@ -219,6 +219,13 @@ def in_space(dataset: xarray.Dataset, vectors: Array) -> Array:
 
 
 @optional
+def in_body(dataset: xarray.Dataset, vectors: Array) -> Array:
+    """Vectors along time (rows, 3), space axes, in body axes (rows, 3); None without attitude."""
+    turns = rotation_matrix(need(values(dataset, "quaternion", 4)))
+    return np.asarray(np.einsum("tij,ti->tj", turns, vectors))
+
+
+@optional
 def pole(dataset: xarray.Dataset, axis: str) -> Array:
     """Unit vectors (rows, 3), space axes, of the axis named figure, spin, momentum or core (its rate's)."""
     recorded = values(dataset, f"{axis}_axis", 3)

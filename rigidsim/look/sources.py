@@ -139,19 +139,18 @@ class Seen:
         return np.stack([longitude, np.arcsin(np.clip(self.directions @ figure, -1, 1))], axis=1)
 
 
-def seen(dataset: xarray.Dataset) -> Seen | None:
+@optional
+def seen(dataset: xarray.Dataset) -> Seen:
     """The strongest source of tides in body axes, from positions and attitude or the recorded nadir; None
     where that isn't known.
     """
     listed, found = scene_of(dataset).sources, sources(dataset)
-    quaternion, nadir = signals.values(dataset, "quaternion", 4), signals.values(dataset, "nadir", 3)
-    if found and quaternion is not None and len(found) == len(listed):
-        one = max(found, key=lambda source: source.tide)
-        ways = np.einsum("tij,ti->tj", rotation_matrix(quaternion), one.path)
-        return Seen(one.body, one.name, ways / signals.norms(ways)[:, None])
-    if nadir is None or len(listed) != 1:
-        return None
-    return Seen(body_of(listed[0]), _name_of(listed[0]), nadir)
+    strongest = max(found, key=lambda source: source.tide, default=None)
+    ways = None if strongest is None else signals.in_body(dataset, strongest.path)
+    if strongest is not None and ways is not None and len(found) == len(listed):
+        return Seen(strongest.body, strongest.name, ways / signals.norms(ways)[:, None])
+    need(len(listed) == 1)
+    return Seen(body_of(listed[0]), _name_of(listed[0]), need(signals.values(dataset, "nadir", 3)))
 
 
 def toward(dataset: xarray.Dataset) -> Array | None:
@@ -232,15 +231,11 @@ def pointing_angle(dataset: xarray.Dataset) -> tuple[str, str, Array]:
     angles, bodies = signals.values(dataset, "roll_pitch_yaw", 3), scene_of(dataset).attractors
     if ways is None and "libration" not in dataset and (angles is None or steep(angles)):
         ways, one = signals.values(dataset, "nadir", 3), seen(dataset)
-        body = None if one is None else one.body
-        position = signals.values(dataset, "position", 3)
-        if ways is None and position is not None and "quaternion" in dataset and len(bodies) == 1:
-            turn = rotation_matrix(np.asarray(dataset["quaternion"].transpose("time", ...).values))
-            ways = np.einsum(
-                "tij,ti->tj", turn, np.array(bodies[0].get("position") or np.zeros(3)) - position
-            )
-            ways, body = ways / signals.norms(ways)[:, None], body_of(bodies[0])
-            ways = ways if np.linalg.norm(ways.mean(axis=0)) > _FACING else None
+        body, position = None if one is None else one.body, signals.values(dataset, "position", 3)
+        if ways is None and position is not None and len(bodies) == 1:
+            place, body = np.array(bodies[0].get("position") or np.zeros(3)), body_of(bodies[0])
+            ways = need(signals.in_body(dataset, place - position))
+            need(np.linalg.norm((ways / signals.norms(ways)[:, None]).mean(axis=0)) > _FACING)
         towards = "the direction of " + called(body, "source")
     ways = need(ways)
     need(np.isfinite(ways).any())

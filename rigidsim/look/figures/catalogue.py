@@ -394,12 +394,9 @@ class Kind:
 
     def shows(self, rows: xarray.Dataset) -> bool:
         """Whether it can be drawn of a dataset (in memory)."""
-        return bool(found_of(*self.leading, rows))
-
-    @property
-    def leading(self) -> tuple[Finders, Sequence[str]]:
-        """What it is named for: planes if it has some, else curves."""
-        return (PLANES, self.planes) if self.planes else (CURVES, self.curves)
+        return bool(
+            found_of(PLANES, self.planes, rows) or (not self.planes and found_of(CURVES, self.curves, rows))
+        )
 
 
 KINDS: dict[str, Kind] = {

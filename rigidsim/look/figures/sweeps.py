@@ -64,27 +64,24 @@ class Axis:
     def of(cls, dataset: xarray.Dataset, dim: str) -> "Axis":
         """The axis of a dimension."""
         words, count = dim.replace("_", " "), dataset.sizes[dim]
-        own = [dataset[name] for name in (f"{dim}_value", dim) if name in dataset.coords][:1]
+        own = next((dataset[name] for name in (f"{dim}_value", dim) if name in dataset.coords), None)
         zipped = [c for c in dataset.coords.values() if c.dims == (dim,) and "swept_key" in c.attrs]
-        for one in (*own, *zipped):
-            if one.ndim == 1 and one.dtype.kind in "fi":
+        for one in (own, *zipped):
+            if one is not None and one.ndim == 1 and one.dtype.kind in "fi":
                 divisor, unit = _unit_of(dataset, one)
                 place = np.asarray(one.values, dtype=np.float64) / divisor
                 ordered = str(one.name) == dim or len(set(np.diff(place) > 0)) < 2
                 return cls(
                     dim, place, _named(one, unit), [f"{words} {x:.4g}" for x in place], ordered=ordered
                 )
-        place, texts = np.arange(float(count)), [f"{words} {n}" for n in range(count)]
-        if not own:
-            return cls(dim, place, f"{words}, counted from 0", texts)
-        values, directions = own[0].values, None
-        if values.shape[1:] == (3,) and count >= _FEWEST:
-            lengths = np.linalg.norm(values, axis=1)
-            if lengths.min() > 0 and np.ptp(lengths) <= _STILL * lengths.max():
-                directions = values / lengths[:, None]
-        few = count <= _MOST_SHOWN
-        label = _named(own[0]) if few else f"{words}, counted from 0"
-        return cls(dim, place, label, [_text(value) for value in values], few, directions=directions)
+        values = np.array([f"{words} {n}" for n in range(count)]) if own is None else own.values
+        many = values.shape[1:] == (3,) and count >= _FEWEST
+        lengths = np.linalg.norm(values, axis=1, keepdims=True) if many else np.zeros(1)
+        directed = lengths.min() > 0 and np.ptp(lengths) <= _STILL * lengths.max()
+        few = own is not None and count <= _MOST_SHOWN
+        label = _named(own) if few and own is not None else f"{words}, counted from 0"
+        texts, directions = [_text(value) for value in values], values / lengths if directed else None
+        return cls(dim, np.arange(float(count)), label, texts, few, directions=directions)
 
     @property
     def log(self) -> bool:
@@ -316,22 +313,21 @@ def _points(dataset: xarray.Dataset, variable: xarray.DataArray, members: list[A
     which = np.repeat(np.arange(len(table)), table.shape[1])[::stride]
     figure = blank(dataset, 8.4, 6.0)
     axes = figure.add_subplot()
-    style: dict[str, Any] = {"s": 2.5, "lw": 0, "rasterized": True}
     if rows.shape[1] > 1:
         # the first two components that vary: what the section is cut at doesn't, but for rounding
         known = rows[np.isfinite(rows).all(axis=1)]
-        still = np.ptp(known, axis=0) <= _STILL * np.abs(known).max() if len(known) else [False]
-        one, other = sorted(np.argsort(still, kind="stable")[:2].tolist()) if len(known) else (0, 1)
-        axes.scatter(rows[:, one], rows[:, other], c=which, cmap="viridis", **style)
+        still = np.ptp(known, axis=0) <= _STILL * np.abs(known).max() if len(known) else [False] * len(rows.T)
+        both = sorted(np.argsort(still, kind="stable")[:2].tolist())
         names = [" ".join(parts) for parts in product(*(variable[dim].values for dim in rest))]
-        axes.set(xlabel=f"{_named(variable)}, {names[one]}", ylabel=f"{_named(variable)}, {names[other]}")
-        titled(axes, f"{_title(variable)}; coloured by member")
-        return figure
-    alone = len(members) == 1
-    place = members[0].place if alone else np.arange(len(table))
-    axes.scatter(place[which], rows[:, 0], color=GREY, **style)
-    axes.set(xlabel=members[0].label if alone else "member", ylabel=_named(variable))
-    titled(axes, _title(variable))
+        (x, y), hue = rows[:, both].T, which
+        across, up = (f"{_named(variable)}, {names[k]}" for k in both)
+    else:
+        alone = len(members) == 1
+        x, y, hue = (members[0].place if alone else np.arange(len(table)))[which], rows[:, 0], GREY
+        across, up = members[0].label if alone else "member", _named(variable)
+    axes.scatter(x, y, c=hue, s=2.5, lw=0, rasterized=True)
+    axes.set(xlabel=across, ylabel=up)
+    titled(axes, _title(variable) + ("; coloured by member" if rows.shape[1] > 1 else ""))
     return figure
 
 
