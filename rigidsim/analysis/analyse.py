@@ -78,7 +78,7 @@ def _decomposed(
     per_sample, factor = 2 * context.pi / clock.spacing, 2 if real else 1  # of a cosine to its exponential
     finest = 2.0**-clock.bits  # of the spacing
     total, listed = found.sum, []
-    for n, (frequency, amplitude) in enumerate(zip(total.frequencies, total.amplitudes, strict=True)):
+    for n, (frequency, amplitude) in enumerate(total.lines):
         observed, size = per_sample * frequency, abs(complex(amplitude))
         if real and frequency < 0:
             observed, amplitude = -observed, context.conj(amplitude)

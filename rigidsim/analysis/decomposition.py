@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigidsim.analysis.exponentials import Complexes, Reals, SignalSamples, Sum, mirrored, products
-from rigidsim.analysis.secular import hidden_rate
 from rigidsim.analysis.windows import Spectrum, hann, moments, peak, positions, spectrum
 
 _FALSE_ALARM = 1e-5  # chance that noise alone shows a line
@@ -29,6 +28,15 @@ _STEPS = 3  # of Newton's method after each new line
 _HIGHEST_ORDER = 10
 _MOST_STEPS = 25  # of Newton's method
 CLOSEST = 0.6  # bins between lines below which Newton's method can't separate them
+# of the error of a secular rate, see ``hidden_rate``
+_DEGREE = 9  # of the polynomial in the slow part: a line of one turn in the samples to some 1e-4
+_NEAR = 30.0  # bins from zero within which lines may be pieces of the slow part
+_PIECE = 0.1  # of what is left, above which a line is one of its own; pieces were 1e-4 to 3e-2
+_SURE = 4.0  # standard deviations above which something is there
+_CELLS = 4096
+_STRAIGHT = 1e-3  # k, in half lengths, below which rounding hides how exponentials differ from polynomials
+_BENT = 1e-2  # k of an exponential that changes by a tenth of its logarithm in half the length
+_LONGEST = 3.0  # half lengths that a slow part may take to change by e, where the samples don't say
 
 
 @dataclass(frozen=True)
@@ -70,13 +78,8 @@ def decompose(
     total = settled(double, total, final)
     while (weaker := _merged(total, samples.real, search.limit)) is not None:
         search.close.append(float(total.frequencies[weaker]))
-        kept = [n for n in range(len(total.frequencies)) if n != weaker]
-        total = replace(
-            total,
-            frequencies=tuple(total.frequencies[n] for n in kept),
-            amplitudes=tuple(total.amplitudes[n] for n in kept),
-        )
-        total = settled(double, total, final)
+        kept = [line for n, line in enumerate(total.lines) if n != weaker]
+        total = settled(double, total.with_lines(kept), final)
     if samples.bits > 53:
         total = refined(samples, total, final)
     return _judged(samples, total, final, search)
@@ -175,26 +178,20 @@ class _Search:
         return None
 
     def _near(self, frequency: float) -> bool:
-        places = _places(self.total, self.samples.real)
-        mirrored = -frequency * self.samples.count if self.samples.real else math.inf
-        if self.total.polynomial:
-            places = np.append(places, 0.0)
-        here = frequency * self.samples.count
-        gaps = np.abs(apart(here - places, self.samples.count)).tolist()
-        if self.samples.real and not self.total.polynomial:
-            gaps.append(abs(here - mirrored))
+        count, total = self.samples.count, self.total
+        here, places = frequency * count, _places(total, self.samples.real)
+        others = np.append(places, 0.0) if total.polynomial else places
+        gaps = np.abs(apart(here - others, count)).tolist()
+        if self.samples.real and not total.polynomial:  # from its own mirror image
+            gaps.append(2 * abs(here))
         return min(gaps, default=math.inf) < _NEAREST
 
     def _add(self, frequency: float, amplitude: complex) -> None:
         context = self.samples.context
         if self.samples.real:  # between a line at Nyquist's frequency and its mirror image nothing decides
             frequency = min(frequency, 0.5 - 0.5 / self.samples.count)
-        self.total = replace(
-            self.total,
-            frequencies=(*self.total.frequencies, context.mpf(frequency)),
-            amplitudes=(*self.total.amplitudes, context.mpc(amplitude)),
-        )
-        self.total = folded(refined(self.samples, self.total, self.order, steps=_STEPS))
+        grown = self.total.with_lines([*self.total.lines, (context.mpf(frequency), context.mpc(amplitude))])
+        self.total = folded(refined(self.samples, grown, self.order, steps=_STEPS))
 
 
 def _judged(samples: SignalSamples, total: Sum, order: int, search: _Search) -> Decomposition:
@@ -216,7 +213,7 @@ def _judged(samples: SignalSamples, total: Sum, order: int, search: _Search) -> 
     powers, lines = len(total.polynomial), len(total.frequencies) * (2 if samples.real else 1)
     held = at_nyquist(total, samples.real)
     frequency_errors, amplitude_errors = [], []
-    for n, (frequency, amplitude) in enumerate(zip(total.frequencies, total.amplitudes, strict=True)):
+    for n, (frequency, amplitude) in enumerate(total.lines):
         level = beside(float(frequency)) * growth[powers + n]
         turned = beside(float(frequency)) * growth[powers + lines + n]
         strength = abs(complex(amplitude))
@@ -247,7 +244,7 @@ def amplitude_spectrum(samples: SignalSamples, found: Decomposition, points: int
     """Spectrum of a signal without its secular part: frequencies (turns per sample) and sizes; of a real one
     those of cosines. Of neighbouring points the largest is kept, so that no line is lost.
     """
-    secular = replace(found.sum, frequencies=(), amplitudes=())
+    secular = found.sum.with_lines(())
     left = replace(samples, parts=samples.parts[:1], bits=53).remainder(secular)
     shown = spectrum(left, min(found.order, _SEARCH_ORDERS[0]), real=samples.real)
     size = shown.sizes * (2 if samples.real else 1)
@@ -269,15 +266,11 @@ def folded(total: Sum) -> Sum:
     A whole turn per sample changes nothing at whole numbers, but samples are counted from the middle: of an
     even count by halves, where each turn changes the sign.
     """
-    turns = [int(total.context.nint(f)) if abs(f) > 0.5 else 0 for f in total.frequencies]
-    if not any(turns):
-        return total
-    odd = [n * (total.count - 1) % 2 for n in turns]
-    return replace(
-        total,
-        frequencies=tuple(f - n for f, n in zip(total.frequencies, turns, strict=True)),
-        amplitudes=tuple(-a if o else a for a, o in zip(total.amplitudes, odd, strict=True)),
-    )
+    lines = []
+    for f, a in total.lines:
+        turns = int(total.context.nint(f)) if abs(f) > 0.5 else 0
+        lines.append((f - turns, -a if turns * (total.count - 1) % 2 else a))
+    return total.with_lines(lines)
 
 
 def settled(samples: SignalSamples, total: Sum, order: int) -> Sum:
@@ -299,15 +292,14 @@ def at_nyquist(total: Sum, real: bool) -> list[bool]:
 
 def _held(total: Sum, real: bool) -> Sum:
     """The sum with lines near Nyquist's frequency moved to it, with the amplitude that the samples show."""
-    context, count = total.context, total.count
-    frequencies, amplitudes = list(total.frequencies), list(total.amplitudes)
-    for n, (frequency, amplitude) in enumerate(zip(frequencies, amplitudes, strict=True)):
-        if real and 2 * abs(0.5 - abs(frequency)) * count < CLOSEST:
-            amplitude = context.conj(amplitude) if frequency < 0 else amplitude
-            frequencies[n] = context.mpf(0.5)
+    context, count, lines = total.context, total.count, []
+    for f, a in total.lines:
+        if real and 2 * abs(0.5 - abs(f)) * count < CLOSEST:
             # the exponential is real at samples counted by whole numbers, imaginary at those by halves
-            amplitudes[n] = context.mpc(amplitude.real, 0) if count % 2 else context.mpc(0, amplitude.imag)
-    return replace(total, frequencies=tuple(frequencies), amplitudes=tuple(amplitudes))
+            part = -a.imag if f < 0 else a.imag
+            f, a = context.mpf(0.5), context.mpc(a.real, 0) if count % 2 else context.mpc(0, part)
+        lines.append((f, a))
+    return total.with_lines(lines)
 
 
 def refined(samples: SignalSamples, total: Sum, order: int, steps: int = _MOST_STEPS) -> Sum:
@@ -328,37 +320,26 @@ def refined(samples: SignalSamples, total: Sum, order: int, steps: int = _MOST_S
 
 def _step(samples: SignalSamples, total: Sum, left: Complexes, order: int) -> tuple[float, Sum, float]:
     """The largest change of an amplitude, the sum after the step, and the step's size over the signal's."""
-    context, count = total.context, total.count
+    context = total.context
     whole = mirrored(total, samples.real)
-    lines, powers = len(whole.frequencies), len(whole.polynomial)
-    right = _products(whole, left, order)
-    matrix = _gram(whole, order)
-    found = np.linalg.lstsq(matrix, right, rcond=1e-12)[0]
-    polynomial = found[:powers]
-    change, turning = found[powers : powers + lines], found[powers + lines :]
-    own = lines // 2 if samples.real else lines
-    held = at_nyquist(total, samples.real)
-    frequencies, amplitudes = [], []
-    for k in range(own):
-        amplitude = complex(whole.amplitudes[k])
+    found = np.linalg.lstsq(_gram(whole, order), _products(whole, left, order), rcond=1e-12)[0]
+    powers, count = len(whole.polynomial), len(whole.frequencies)
+    polynomial, change, turning = np.split(found, [powers, powers + count])
+    held, lines = at_nyquist(total, samples.real), []
+    for k, (frequency, amplitude) in enumerate(total.lines):
+        size = complex(amplitude)
         # a exp(i pi D x), D in bins: the change with D is i pi x a exp(...)
-        shift = (turning[k] / amplitude).imag / math.pi if amplitude and not held[k] else 0.0
-        shift = float(np.clip(shift, -0.5, 0.5))
-        frequencies.append(total.frequencies[k] + context.mpf(shift) / count)
-        amplitudes.append(total.amplitudes[k] + context.mpc(complex(change[k])))
+        shift = (turning[k] / size).imag / math.pi if size and not held[k] else 0.0
+        moved = frequency + context.mpf(float(np.clip(shift, -0.5, 0.5))) / total.count
+        lines.append((moved, amplitude + context.mpc(complex(change[k]))))
     coefficients = [
         c + context.mpc(complex(x.real if samples.real else x))
         for c, x in zip(total.polynomial, polynomial, strict=True)
     ]
-    largest = max([abs(complex(a)) for a in (*amplitudes, *coefficients)], default=0.0)
-    size = float(np.max(np.abs(found), initial=0.0))
-    moved = replace(
-        total,
-        polynomial=tuple(coefficients),
-        frequencies=tuple(frequencies),
-        amplitudes=tuple(amplitudes),
-    )
-    return size, moved, size / largest if largest else 0.0
+    largest = max([abs(complex(a)) for a in (*coefficients, *(a for _, a in lines))], default=0.0)
+    step = float(np.max(np.abs(found), initial=0.0))
+    after = replace(total, polynomial=tuple(coefficients)).with_lines(lines)
+    return step, after, step / largest if largest else 0.0
 
 
 def _products(total: Sum, left: Complexes, order: int) -> Complexes:
@@ -394,3 +375,70 @@ def error_growth(total: Sum, order: int) -> Reals:
         return np.empty(0)
     inverse = np.linalg.pinv(matrix, rcond=1e-12, hermitian=True)
     return np.sqrt(np.maximum(np.diag(inverse).real * np.diag(matrix).real, 1.0))
+
+
+def hidden_rate(total: Sum, left: Complexes, noise: float) -> float:
+    """What a slow part, neither a line nor a polynomial, may have added to the rate of a real signal, per
+    half length; 0 if nothing of it is left in the remainder (n,), whose mean has the standard deviation
+    ``noise``, as if it were white.
+
+    Of an exponential, or of a line that makes less than a turn within the samples, lines and polynomial
+    absorb what they can: next to nothing may be left, while the rate contains the whole slope of it. What
+    such parts have in common is f''' = k f' (k = 1 / tau^2, or -w^2): from the curvature in the middle and
+    its derivatives follows the slope that the rate has taken over.
+    """
+    c, s = _polynomial(left.real, noise, 3)
+    if not np.any(np.abs(c[2:]) > _SURE * s[2:]):
+        return 0.0
+    bent = float(np.max(np.abs(c[2:])))
+    higher, spread = _polynomial(_with_pieces(total, left, bent), noise, _DEGREE)
+    if np.any(np.abs(higher[2:4] - c[2:]) > bent + _SURE * spread[2:4]):  # what lines have left, nothing slow
+        return abs(float(c[1]))
+    return _absorbed(higher, spread)
+
+
+def _with_pieces(total: Sum, left: Complexes, bent: float) -> Reals:
+    """What is left together with lines that are pieces of the same: far less than it bends, (n,)."""
+    lines = [
+        (f, a)
+        for f, a in total.lines
+        if abs(float(f)) * total.count < _NEAR and 2 * abs(complex(a)) < _PIECE * bent
+    ]
+    values = left.real
+    if lines:
+        values = values + 2 * Sum(total.context, total.count, (), (), ()).with_lines(lines).values().real
+    return np.asarray(values)
+
+
+def _polynomial(values: Reals, noise: float, degree: int) -> tuple[Reals, Reals]:
+    """Coefficients of the windowed least squares, and their standard deviations in white noise."""
+    count = len(values)
+    x, weights, means = (_cells(column) for column in (positions(count), hann(count, 1), values))
+    columns = np.stack([x**m for m in range(degree + 1)], axis=1)
+    weighted = columns * weights[:, None]
+    inverse = np.linalg.inv(columns.T @ weighted / len(x))
+    spread = inverse @ (weighted.T @ weighted / len(x)) @ inverse
+    return inverse @ (weighted.T @ means) / len(x), noise * np.sqrt(np.diag(spread))
+
+
+def _cells(values: Reals) -> Reals:
+    """Means over neighbouring samples, of which few thousand are enough for what is slow."""
+    width = max(len(values) // _CELLS, 1)
+    return np.asarray(values[: len(values) // width * width].reshape(-1, width).mean(axis=1))
+
+
+def _absorbed(c: Reals, s: Reals) -> float:
+    """The part of the rate that belongs to a slow part with these coefficients and standard deviations."""
+    cubic = max(abs(c[1]) - _SURE * s[1], 0.0)  # what a cubic drift adds to the rate in the middle
+    size = 4 * c[2] ** 2 + 9 * c[3] ** 2
+    if not size:
+        return 0.0
+    # f''' is 6 c3 + 24 c4 x + 60 c5 x^2, and k (c1 + 2 c2 x + 3 c3 x^2): least squares of the last two
+    k = (48 * c[2] * c[4] + 180 * c[3] * c[5]) / size
+    unsure = _SURE * math.hypot(24 * s[4], 60 * s[5]) / math.sqrt(size)
+    if abs(k) > max(unsure, _STRAIGHT):
+        return float(max(cubic, abs(6 * c[3] / k - c[1])))
+    if unsure < _BENT:  # it is a polynomial
+        return float(cubic)
+    # all that is known is by how much the rate itself changes within half the length
+    return float(max(cubic, _LONGEST * math.hypot(2 * c[2], 3 * c[3])))

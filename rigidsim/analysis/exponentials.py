@@ -6,7 +6,7 @@ at any length, since phases are reduced in integers. Beyond it numbers are integ
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -66,6 +66,16 @@ class Sum:
     frequencies: tuple[Any, ...]
     amplitudes: tuple[Any, ...]
 
+    @property
+    def lines(self) -> list[tuple[Any, Any]]:
+        """Frequencies and amplitudes."""
+        return list(zip(self.frequencies, self.amplitudes, strict=True))
+
+    def with_lines(self, lines: Iterable[tuple[Any, Any]]) -> Self:
+        """The sum with other lines."""
+        frequencies, amplitudes = tuple(zip(*lines, strict=True)) or ((), ())
+        return replace(self, frequencies=frequencies, amplitudes=amplitudes)
+
     def values(self) -> Complexes:
         """All samples, in double precision."""
         first, within = tables(self.frequencies, self.count)
@@ -79,11 +89,8 @@ class Sum:
     def slope(self) -> Self:
         """The derivative, per sample."""
         turn = self.context.mpc(0, 2 * self.context.pi)
-        return replace(
-            self,
-            polynomial=tuple(2 * m * c / self.count for m, c in enumerate(self.polynomial) if m),
-            amplitudes=tuple(turn * f * a for f, a in zip(self.frequencies, self.amplitudes, strict=True)),
-        )
+        polynomial = tuple(2 * m * c / self.count for m, c in enumerate(self.polynomial) if m)
+        return replace(self, polynomial=polynomial).with_lines((f, turn * f * a) for f, a in self.lines)
 
 
 @dataclass(frozen=True)
@@ -119,14 +126,8 @@ class SignalSamples:
 
 def mirrored(total: Sum, real: bool) -> Sum:
     """The sum together with the mirror images of a real signal's lines."""
-    if not real:
-        return total
-    context = total.context
-    return replace(
-        total,
-        frequencies=(*total.frequencies, *(-f for f in total.frequencies)),
-        amplitudes=(*total.amplitudes, *(context.conj(a) for a in total.amplitudes)),
-    )
+    images = [(-f, total.context.conj(a)) for f, a in total.lines] if real else []
+    return total.with_lines([*total.lines, *images])
 
 
 def _wide_difference(total: Sum, parts: Sequence[tuple[Reals, Reals]], bits: int) -> Complexes:
@@ -142,7 +143,7 @@ def _wide_difference(total: Sum, parts: Sequence[tuple[Reals, Reals]], bits: int
             _powers(context, a * context.expjpi(f * (1 - count)), 2 * f * width, -(-count // width), shift),
             np.array(_powers(context, context.mpc(1), 2 * f, width, bits), dtype=object),
         )
-        for f, a in zip(total.frequencies, total.amplitudes, strict=True)
+        for f, a in total.lines
     ]
     factors = [[int(context.ldexp(x, shift)) for x in (c.real, c.imag)] for c in total.polynomial]
     for row, begin in enumerate(range(0, count, width)):

@@ -147,22 +147,17 @@ class Signal:
 
     def samples(self, clock: EquidistantTimes) -> SignalSamples:
         """All samples of the signal. Raises ``RigidsimError`` if some aren't finite."""
-        names = parts_in(self.dataset, self.variable)
-        parts = []
-        for name in names:
-            columns = [
-                np.asarray(self.dataset[name].isel(chosen).values, dtype=np.float64)
-                for chosen in self.components
-            ]
-            parts.append((columns[0], columns[1] if len(columns) > 1 else np.zeros_like(columns[0])))
-        if not all(np.all(np.isfinite(column)) for pair in parts for column in pair):
+        columns = [
+            [np.asarray(self.dataset[name].isel(chosen).values, np.float64) for chosen in self.components]
+            for name in parts_in(self.dataset, self.variable)
+        ]
+        if not np.isfinite(columns).all():
             raise RigidsimError(
                 f"{self.name}: not all samples are finite; analyse needs a part without gaps, for instance "
                 "dataset.isel(time=slice(0, 1000))"
             )
-        return SignalSamples(
-            tuple(parts), self.real, bits_of(self.dataset, len(parts)), clock.context, clock.late
-        )
+        parts = tuple((real, *imaginary) if imaginary else (real, 0.0 * real) for real, *imaginary in columns)
+        return SignalSamples(parts, self.real, bits_of(self.dataset, len(parts)), clock.context, clock.late)
 
     @property
     def in_body(self) -> bool:
@@ -177,53 +172,44 @@ def signals_of(dataset: xarray.Dataset, chosen: Sequence[str] = ()) -> list[Sign
     offered = [signal for name in _variables(dataset) for signal in _signals(dataset, name)]
     if not offered:
         raise RigidsimError("the dataset has no variable along time that could be analysed")
-    if chosen:
-        found: list[Signal] = []
-        for name in chosen:
-            matching = [s for s in offered if name in (s.name, s.variable)]
-            if not matching:
-                raise RigidsimError(
-                    f"no signal {name!r}; there are {', '.join(s.name for s in offered)}; the name of a "
-                    "variable stands for all of its signals"
-                )
-            found += [s for s in matching if s not in found]
-        return found
+    found = list[Signal]()
+    for name in chosen:
+        matching = [s for s in offered if name in (s.name, s.variable)]
+        if not matching:
+            raise RigidsimError(
+                f"no signal {name!r}; there are {', '.join(s.name for s in offered)}; the name of a "
+                "variable stands for all of its signals"
+            )
+        found += [s for s in matching if s not in found]
     by_default = [s for s in offered if s.variable in FIRST and not s.name.endswith((".spin", ".momentum"))]
     rates = [s for s in offered if s.variable == "angular_velocity"]
-    return sorted(by_default, key=lambda s: FIRST.index(s.variable)) or rates or offered
+    return found or sorted(by_default, key=lambda s: FIRST.index(s.variable)) or rates or offered
 
 
 def _variables(dataset: xarray.Dataset) -> list[str]:
     """Numeric variables along time, without residuals and drifts."""
-    names = []
-    for name, data in dataset.data_vars.items():
-        plain = (
-            "time" in data.dims and np.issubdtype(data.dtype, np.floating) and "residual_of" not in data.attrs
-        )
-        bookkeeping = str(name).endswith(("_drift", "_put_back"))
-        if plain and not bookkeeping and len(data.dims) <= 2:
-            names.append(str(name))
-    return names
+    return [
+        str(name)
+        for name, data in dataset.data_vars.items()
+        if "time" in data.dims and len(data.dims) <= 2 and np.issubdtype(data.dtype, np.floating)
+        if "residual_of" not in data.attrs and not str(name).endswith(("_drift", "_put_back"))
+    ]
 
 
 def _signals(dataset: xarray.Dataset, name: str) -> list[Signal]:
     data = dataset[name].transpose("time", ...)
     units = str(data.attrs.get("units", ""))
-    if data.ndim == 1:
-        return [Signal(name, name, units, True, 1 if units == "rad" else 0, dataset, ({},))]
-    dim = str(data.dims[1])
-    labels = (
-        [str(x) for x in data[dim].values] if dim in data.coords else [str(n) for n in range(data.shape[1])]
-    )
-    signals, paired = [], set()
-    for real, imaginary in _PAIRS.get(name) or _PAIRS.get(dim, []):
-        if real in labels and imaginary in labels:
-            picks = tuple({dim: labels.index(label)} for label in (real, imaginary))
-            full = f"{name}.{real}+i{imaginary}"
-            signals.append(Signal(full, name, units, False, -1, dataset, picks))
-            paired |= {real, imaginary}
     degree = 1 if units == "rad" else 0
-    for n, label in enumerate(labels):
-        if label not in paired:
-            signals.append(Signal(f"{name}.{label}", name, units, True, degree, dataset, ({dim: n},)))
-    return signals
+    if data.ndim == 1:
+        return [Signal(name, name, units, True, degree, dataset, ({},))]
+    dim = str(data.dims[1])
+    labels = list(map(str, data[dim].values if dim in data.coords else range(data.shape[1])))
+
+    def at(label: str) -> dict[str, Any]:
+        return {dim: labels.index(label)}
+
+    pairs = [pair for pair in _PAIRS.get(name) or _PAIRS.get(dim, []) if {*pair} <= {*labels}]
+    turning = [Signal(f"{name}.{x}+i{y}", name, units, False, -1, dataset, (at(x), at(y))) for x, y in pairs]
+    alone = [(n, label) for n, label in enumerate(labels) if all(label not in pair for pair in pairs)]
+    plain = [Signal(f"{name}.{label}", name, units, True, degree, dataset, ({dim: n},)) for n, label in alone]
+    return [*turning, *plain]
