@@ -28,7 +28,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from itertools import chain, groupby
+from itertools import chain
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, NamedTuple, Self
@@ -221,6 +221,7 @@ _SAME_STEPS = 10.0
 """Ratio of the error of the best to that distance, where both take the same steps until invariants are first
 projected: it was up to six times too small (13 once).
 """
+_FINEST = -61  # power of ten below which no setting is advised
 _SAMPLES, _SHORT_SAMPLES = 32, 6  # attitudes compared, over the whole part and over the short one
 
 
@@ -617,11 +618,10 @@ def on_front(dataset: xarray.Dataset) -> np.ndarray:
     """
     error, cost = trusted_error(dataset), dataset["cpu_ratio"].values
     fit = (dataset["status"].values == RowStatus.MEASURED.value) & np.isfinite(error) & np.isfinite(cost)
-    result = np.zeros(len(error), dtype=bool)
-    best = math.inf
-    for n in sorted(np.nonzero(fit)[0], key=lambda n: (cost[n], error[n])):
-        if error[n] < best:
-            best, result[n] = error[n], True
+    order, result = np.lexsort((error, cost)), np.zeros(len(error), dtype=bool)
+    order = order[fit[order]]
+    best = np.minimum.accumulate(np.append(math.inf, error[order]))[:-1]
+    result[order[error[order] < best]] = True
     return result
 
 
@@ -649,33 +649,28 @@ def advice(dataset: xarray.Dataset) -> list[BestSetting]:
     A setting that was measured over less of the motion is named only if no other reaches the accuracy.
     """
     error, cost = trusted_error(dataset), dataset["cpu_ratio"].values
-    status = dataset["status"].values
-    known = np.isfinite(error) & np.isfinite(cost)
-    if not known.any():
-        return []
-    smallest = max(float(error[known].min()), 1e-60)
-    found: list[tuple[int, int, bool]] = []  # exponent, setting, measured over less
-    for exponent in range(0, math.floor(math.log10(smallest)) - 1, -1):
-        for kind in (RowStatus.MEASURED, RowStatus.SHORT):
-            fit = np.nonzero(known & (status == kind.value) & (error <= 10.0**exponent))[0]
-            if len(fit):
-                found.append((exponent, int(min(fit, key=lambda n: cost[n])), kind is RowStatus.SHORT))
-                break
-    result: list[BestSetting] = []
-    for n, decades in groupby(found, key=lambda best: best[1]):
-        same = list(decades)
-        (exponent, _, less), (last, _, _) = same[0], same[-1]
-        one = dataset.isel(setting=n)
+    known, result = np.isfinite(error) & np.isfinite(cost), list[BestSetting]()
+    for exponent in range(0, _FINEST, -1):
+        fit = known & (error <= 10.0**exponent)
+        if not fit.any():
+            break
+        whole = fit & (dataset["status"].values == RowStatus.MEASURED.value)
+        n = int(np.where(whole if whole.any() else fit, cost, math.inf).argmin())
+        one, more_than = dataset.isel(setting=n), 10.0 ** (exponent - 1)
+        title = str(one["setting"].item())
+        if result and result[-1].title == title:
+            result[-1] = replace(result[-1], more_than=more_than)
+            continue
         result.append(
             BestSetting(
                 at_most=10.0**exponent,
-                more_than=10.0 ** (last - 1),
-                title=str(one["setting"].item()),
+                more_than=more_than,
+                title=title,
                 error=float(error[n]),
                 cost=float(one["cpu_ratio"]),
                 seconds=float(one["measured_time"]),
                 cpu_seconds=float(one["cpu_seconds"]),
-                less=less,
+                less=not whole.any(),
                 keys=_keys(one),
             )
         )
@@ -683,16 +678,16 @@ def advice(dataset: xarray.Dataset) -> list[BestSetting]:
 
 
 def _keys(one: xarray.Dataset) -> tuple[str, ...]:
-    """The setting as lines for ``[integrator]``."""
-    precision = precision_titled(str(one["precision"].item()))
-    keys = [f"precision = {precision}" if isinstance(precision, int) else f'precision = "{precision}"']
-    default, method, tolerance = Setting(precision), one["method"].item(), float(one["tolerance"])
-    if method != default.method:
-        keys.append(f'method = "{method}"')
-    if math.isfinite(tolerance) and tolerance != default.step_tolerance:
-        keys.append(f"tolerance = {tolerance:.0e}")
-    if one["formulation"].item() != default.formulation:
-        keys.append(f'formulation = "{one["formulation"].item()}"')
-    if one["held"].item():
-        keys.append("hold_invariants = true")
-    return tuple(keys)
+    """The setting as lines for ``[integrator]``, those apart from the precision that aren't defaults."""
+    default = Setting(precision_titled(str(one["precision"].item())))
+    tolerance = float(one["tolerance"])
+    loose = math.isfinite(tolerance) and tolerance != default.step_tolerance
+    setting = replace(
+        default,
+        tolerance=tolerance if loose else None,
+        formulation=str(one["formulation"].item()),
+        hold_invariants=bool(one["held"].item()),
+        method=str(one["method"].item()),
+    )
+    usual = default.keys()
+    return tuple(f"{k} = {v}" for k, v in setting.keys().items() if k == "precision" or v != usual[k])

@@ -318,8 +318,8 @@ def chosen(
         choice = choose(experiment, accuracy, loads=loads, beyond=beyond, report=report, key=key)
     except ConfigError as error:
         raise error.at(experiment.source) from None
-    keys = choice.setting.overrides(without=integrator.model_fields_set)
-    return experiment.having(keys), choice
+    keys, given = choice.setting.keys(), integrator.model_fields_set
+    return experiment.having([f"integrator.{k}={v}" for k, v in keys.items() if k not in given]), choice
 
 
 def choose(

@@ -3,7 +3,6 @@ as a count, so that no clock decides what is chosen; and the accuracy that a con
 """
 
 import math
-from collections.abc import Collection
 from dataclasses import dataclass
 
 from rigidsim.errors import ConfigError, Problem
@@ -60,16 +59,15 @@ class Setting:
         """Order of the Taylor series that the tolerance needs (Jorba and Zou 2005, eq. 11)."""
         return max(2, math.ceil(1 - math.log(self.step_tolerance) / 2))
 
-    def overrides(self, *, without: Collection[str] = ()) -> list[str]:
-        """The setting as ``KEY=VALUE`` texts for ``rigidsim.load``."""
-        keys = {
+    def keys(self) -> dict[str, str]:
+        """The keys of ``[integrator]``, as they are written there."""
+        return {
             "precision": f"{self.precision}" if isinstance(self.precision, int) else f'"{self.precision}"',
             "tolerance": '"auto"' if self.tolerance is None else f"{self.tolerance!r}",
             "formulation": f'"{self.formulation}"',
             "hold_invariants": "true" if self.hold_invariants else '"auto"',
             "method": f'"{self.method}"',
         }
-        return [f"integrator.{key}={value}" for key, value in keys.items() if key not in without]
 
 
 def epsilon(precision: str | int) -> float:
