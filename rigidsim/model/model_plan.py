@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.model.averaged.average import Average
 from rigidsim.model.formulations.averaged import Averaged
 from rigidsim.model.formulations.formulation import (
@@ -234,27 +234,33 @@ def refuse_second_orbits(scene: Scene, loads: Sequence[Load]) -> None:
         if load.pulls:
             continue
         if load.reacts:
-            if any(load.placement == other.placement for other in pulling):
-                raise ConfigError(
+            ensure(
+                not any(load.placement == other.placement for other in pulling),
+                ConfigError(
                     Problem(
                         where, "given with central_gravity of the same body, which has its torque; remove it"
                     )
-                )
+                ),
+            )
         else:
             strength = load.gravitational_parameter
-            if known(strength, attractors):
-                raise ConfigError(
+            ensure(
+                not known(strength, attractors),
+                ConfigError(
                     Problem(
                         where,
                         "given for the point that attracts the body in flight; central_gravity has its "
                         "torque where the body is, and this one would follow another orbit: remove it",
                     )
-                )
-            if known(strength, carried):
-                raise ConfigError(
+                ),
+            )
+            ensure(
+                not known(strength, carried),
+                ConfigError(
                     Problem(
                         where,
                         "given with the gravitational parameter of one of [[bodies]] and another orbit; "
                         'give orbit = {body = "..."}, which is where that body is',
                     )
-                )
+                ),
+            )

@@ -14,7 +14,7 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.names import in_si, written
 from rigidsim.model.scaling import Scaling, exponent
@@ -99,14 +99,16 @@ def refuse_odd_states(scene: Scene) -> None:
     reading = [state for state in scene.states if names_used(state.derivative) & set(opposite)]
     states = random_states(scene) if reading else []
     for state in reading:
-        if changes(state.derivative, states, opposite, scene.context):
-            raise ConfigError(
+        ensure(
+            not changes(state.derivative, states, opposite, scene.context),
+            ConfigError(
                 Problem(
                     state.derivative.where,
                     "changes with the sign of the quaternion, while q and -q are the same attitude; use "
                     "products such as qw*qx, or say where it jumps: sign(qw)*qx",
                 )
-            )
+            ),
+        )
 
 
 # --- units --------------------------------------------------------------------------------------------------

@@ -28,7 +28,7 @@ from typing import Any, ClassVar
 import heyoka as hy
 import numpy as np
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.model.kinematics import Kinematics, seconds
 from rigidsim.model.orbits import KeplerParts, PointMassPair, Pull
 from rigidsim.model.rotations import Symbolic, constant, length, unit
@@ -643,10 +643,10 @@ class PlacedByKernel(Placement):
                 what = f'the body is "{own}", which is one of [[bodies]] and moves by itself; give orbit = '
                 what += '{body = "..."} of another one, or a [body] host that is none of them'
             raise around.fault("source", f'given "{source}", but {what}')
-        if source == around.host:
-            raise around.fault(
-                "source", f'given "{source}", which is the body itself; another one is allowed'
-            )
+        ensure(
+            source != around.host,
+            around.fault("source", f'given "{source}", which is the body itself; another one is allowed'),
+        )
         return cls(ephemeris, ephemeris.sight(source, around.host))
 
     @property
@@ -785,12 +785,14 @@ def kernel_body(source: str, around: Setting) -> Ephemeris:
 
 def refuse_series(around: Setting) -> None:
     """Refuse analytic series beside a kernel whose axes they don't share."""
-    if around.ephemeris is not None and around.axes is None:
-        raise around.fault(
+    ensure(
+        around.ephemeris is None or around.axes is not None,
+        around.fault(
             "ephemeris",
             'given with [ephemeris], whose axes are ICRF unless [frame] axes = "ecliptic J2000"; set '
             "that, or give source instead",
-        )
+        ),
+    )
 
 
 class FlownBy(Placement):

@@ -45,7 +45,7 @@ from typing import Any, Self
 import heyoka as hy
 import numpy as np
 
-from rigidsim.errors import ConfigError, Problem, required
+from rigidsim.errors import ConfigError, Problem, ensure, required
 from rigidsim.model.averaged.free_motion import (
     ORDERS,
     FreeMotion,
@@ -137,8 +137,7 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
            'choose "spin_averaged", or give it an orbit by elements or a table') for name in unsuited),
     ]  # fmt: skip
     for holds, against, remedy in said:
-        if holds:
-            raise refused(level, against, remedy or _FULL)
+        ensure(not holds, refused(level, against, remedy or _FULL))
     if alone and config.model.short_period:
         refuse_short_period(f"what {alone[0].title} does within a rotation")
 
@@ -636,8 +635,10 @@ def driven_by(
         axial -= context.ldexp(context.mpf(float(removed[0])), exponent)
         across -= context.ldexp(context.mpf(float(removed[1])), exponent)
         start = [float(context.ldexp(x, -exponent)) for x in (axial, across)]
-    if scaling.direction < 0:
-        raise refused(level, "torques that change the size of the momentum aren't averaged backwards in time")
+    ensure(
+        scaling.direction > 0,
+        refused(level, "torques that change the size of the momentum aren't averaged backwards in time"),
+    )
     begin, end = (float(context.ldexp(x, -scaling.time)) for x in (scene.start, scene.end))
     times, course, fastest, failure = _followed(torques, np.array(start), begin, end)
     if failure:

@@ -23,7 +23,7 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.model.kinematics import Kinematics, along_axes
 from rigidsim.model.load import Load, Term
 from rigidsim.model.names import written
@@ -241,21 +241,25 @@ class MassLoss(Load):
     def resolve(cls, fields: MassLossFields, around: Setting) -> MassLoss:
         context = around.context
         rate = around.expression("rate", fields.rate, "kg/s")
-        if around.free_flight:
-            raise around.fault(
+        ensure(
+            not around.free_flight,
+            around.fault(
                 "mass_loss",
                 "given for a body with a position or velocity, whose flight has a constant mass; leave "
                 "out [initial] position and velocity",
-            )
+            ),
+        )
         point = [x.at(context) for x in fields.exit_point]
         arm = [x - c for x, c in zip(point, around.body.center_of_mass, strict=True)]
         radius, length = fields.exit_radius.at(context), norm(context, arm)
-        if radius != 0 and length == 0:
-            raise around.fault(
+        ensure(
+            radius == 0 or length != 0,
+            around.fault(
                 "exit_point",
                 "given the centre of mass, from which the axis of a round exit points to its middle; "
                 "give another point, or leave out exit_radius",
-            )
+            ),
+        )
         geometry = []
         for i, x in enumerate(arm):
             row = [-x * y for y in arm]
@@ -276,14 +280,16 @@ class MassLoss(Load):
 
     def torque(self, m: Kinematics) -> list[Term]:
         """Refused with a weight, whose torque is for a constant mass."""
-        if m.scene.torque_arm is not None:
-            raise ConfigError(
+        ensure(
+            m.scene.torque_arm is None,
+            ConfigError(
                 Problem(
                     self.rate.where,
                     "given with uniform_gravity on a body that is held off its centre of mass, whose "
                     "weight takes a constant mass; hold it at its centre of mass",
                 )
-            )
+            ),
+        )
         (rate,) = written(m, [self.rate])
         return _against_rates(m, self.geometry, rate)
 

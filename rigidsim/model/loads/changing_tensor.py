@@ -47,7 +47,7 @@ from typing import Any, TypeVar
 
 import heyoka as hy
 
-from rigidsim.errors import ConfigError, Problem, required
+from rigidsim.errors import ConfigError, Problem, ensure, required
 from rigidsim.model.kinematics import (
     ConstantInertia,
     Kinematics,
@@ -479,8 +479,10 @@ def _raising(config: Config, names: list[str] | None) -> tuple[int, ...]:
                 "tides: name that, or add one",
             )
     found = tuple(known[name] for name in names)
-    if len(set(found)) < len(found):
-        raise fault("raised_by", "the same source is named twice; name each once")
+    ensure(
+        len(set(found)) == len(found),
+        fault("raised_by", "the same source is named twice; name each once"),
+    )
     return found
 
 
@@ -516,22 +518,28 @@ class Elasticity(Load, Carrier):
     def resolve(cls, fields: Config, around: Setting) -> Elasticity:
         table, context = required(fields.body.elasticity), around.context
         love, radius, delay = (x.at(context) for x in (table.love_number, table.radius, table.delay))
-        if around.free_flight:
-            raise fault(
+        ensure(
+            not around.free_flight,
+            fault(
                 "",
                 "given for a body with a position or velocity, whose flight treats it as rigid; leave "
                 "out [initial] position and velocity, and give the source's orbit",
-            )
-        if any(isinstance(x, str) for x in fields.body.principal_moments or []):
-            raise fault("", "given with principal_moments that vary; only one of them can change the tensor")
-        if fields.initial.angular_momentum is not None:
-            raise ConfigError(
+            ),
+        )
+        ensure(
+            not any(isinstance(x, str) for x in fields.body.principal_moments or []),
+            fault("", "given with principal_moments that vary; only one of them can change the tensor"),
+        )
+        ensure(
+            fields.initial.angular_momentum is None,
+            ConfigError(
                 Problem(
                     "[initial] angular_momentum",
                     "given with [body] elasticity, on which it depends what the rates are then; give "
                     "angular_velocity",
                 )
-            )
+            ),
+        )
         rate = None if table.mean_rate is None else table.mean_rate.at(context)
         raising = _raising(fields, table.raised_by)
         named = [source for n in raising if (source := getattr(fields.loads[n], "source", None)) is not None]
@@ -669,8 +677,10 @@ class Elasticity(Load, Carrier):
         """
         context = scene.context
         least = context.minimum(scene.body.principal_moments)
-        if not least > 0:
-            raise fault("", "given for a body without inertia about an axis; give it some, or leave it out")
+        ensure(
+            least > 0,
+            fault("", "given for a body without inertia about an axis; give it some, or leave it out"),
+        )
         squared = dot(scene.angular_velocity, scene.angular_velocity)
         spin = self.strength / 3 * (squared + self.known_rate(scene) ** 2) / least
         tide = context.zero

@@ -51,7 +51,7 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 import heyoka as hy
 from pydantic import Field, StrictInt, StrictStr, Tag
 
-from rigidsim.errors import ConfigError, Problem, required
+from rigidsim.errors import ConfigError, Problem, ensure, required
 from rigidsim.model.harmonics import Harmonics, Series, TurningHarmonics, frame_of, turning
 from rigidsim.model.kinematics import Kinematics, along_axes, inertia_times, quadratic_form, seconds
 from rigidsim.model.load import Load, Term
@@ -700,10 +700,10 @@ class SourceFigure(ByPlacedSource):
 
 def refuse_inside(load: Attraction, radius: Any, key: str, around: Setting) -> None:
     """Refuse a radius of the attracting body within which the body starts, and one that moves."""
-    if load.attracting_point is None:
-        raise around.fault(
-            key, "given for an attracting body that moves; allowed for one at rest, with position"
-        )
+    ensure(
+        load.attracting_point is not None,
+        around.fault(key, "given for an attracting body that moves; allowed for one at rest, with position"),
+    )
     far = norm(around.context, load.placement.at_start(around))
     if far < radius:
         given, there = (around.context.nstr(x, 6) for x in (radius, far))
@@ -728,11 +728,13 @@ def _refuse_pole(source: str | None, around: Setting) -> None:
                 "figure.pole",
                 f'given "{EARTH}", a pole of date, which takes {what}; give {example}, or a vector',
             )
-    if source not in (None, "earth", "399", "earth_moon_barycenter"):
-        raise around.fault(
+    ensure(
+        source in (None, "earth", "399", "earth_moon_barycenter"),
+        around.fault(
             "figure.pole",
             f'given "{EARTH}", the Earth\'s pole, for the source "{source}"; give its own as a vector',
-        )
+        ),
+    )
     ahead = float(required(around.epoch).since_j2000())
     far = max(abs(float(plain(t)) + ahead) for t in (around.start, around.end)) / _CENTURY
     if far > _MOST_CENTURIES:
@@ -806,8 +808,10 @@ class SourceField(ByPlacedSource):
     def beside_of(cls, load: Any, fields: Any, around: Setting) -> Load:
         assert isinstance(load, Attraction)
         given, context = fields.gravity_field, around.context
-        if fields.figure is not None and "2,0" in given.C:
-            raise around.fault("gravity_field.C", 'given "2,0" and figure, whose J2 is the same; remove one')
+        ensure(
+            fields.figure is None or "2,0" not in given.C,
+            around.fault("gravity_field.C", 'given "2,0" and figure, whose J2 is the same; remove one'),
+        )
         found = given.coefficients(context, lambda text: around.fault("gravity_field", text))
         frame = frame_of(context, [x.at(context) for x in given.pole], given.prime_meridian.at(context))
         radius, rate = given.radius.at(context), given.rate.at(context)
@@ -927,17 +931,21 @@ class GravityGradient(SceneLoad):
     @classmethod
     def resolve(cls, fields: GravityGradientFields, around: Setting) -> Attraction:
         if fields.orbit is not None and fields.orbit.body is not None:
-            if fields.gravitational_parameter is not None:
-                raise around.fault(
+            ensure(
+                fields.gravitational_parameter is None,
+                around.fault(
                     "gravitational_parameter", "given with orbit.body, which determines it; remove it"
-                )
+                ),
+            )
             masses, number = around.carried_bodies, attracting_body(fields.orbit, around)
-            if masses.host is None and masses.full:
-                raise around.fault(
+            ensure(
+                masses.host is not None or not masses.full,
+                around.fault(
                     "kind",
                     'given "gravity_gradient" for a body that flies by itself under coupling = "full"; '
                     'give "central_gravity", whose force the bodies feel',
-                )
+                ),
+            )
             placed = FlownByMass if masses.host is None else PlacedAsMass
             mass: Placement = placed(masses, number)
             return Attraction(gravitational_parameter=masses.strengths[number], placement=mass)
@@ -964,8 +972,10 @@ def _distant(fields: GravityGradientFields, strength: Any, around: Setting) -> P
             )
         return PlacedBySeries(fields.ephemeris, around.epoch or J2000)
     position = [x.at(around.context) for x in fields.position or []]
-    if all(x == 0 for x in position):
-        raise around.fault("position", "given the origin, where the body is; another point is allowed")
+    ensure(
+        any(x != 0 for x in position),
+        around.fault("position", "given the origin, where the body is; another point is allowed"),
+    )
     return PlacedAtRest(position)
 
 
@@ -989,21 +999,27 @@ class CentralGravity(SceneLoad):
         ):  # which is the origin of the space axes
             ephemeris = kernel_body(fields.source, around)
             place = FlownByKernel(PlacedByKernel(ephemeris, ephemeris.sight(fields.source, around.host)))
-        if all(x == 0 for x in place.at_start(around)):
-            raise around.fault("kind", "the body starts at the attracting point; start it elsewhere")
+        ensure(
+            any(x != 0 for x in place.at_start(around)),
+            around.fault("kind", "the body starts at the attracting point; start it elsewhere"),
+        )
         return Attraction(gravitational_parameter=strength, placement=place, pulls=True)
 
 
 def _flown_by_mass(orbit: Orbit, around: Setting) -> Attraction:
-    if orbit.body is None:
-        raise around.fault("orbit", "given without body; the name of one of [[bodies]] is allowed")
+    ensure(
+        orbit.body is not None,
+        around.fault("orbit", "given without body; the name of one of [[bodies]] is allowed"),
+    )
     number, masses = attracting_body(orbit, around), around.carried_bodies
-    if masses.host is not None:
-        raise around.fault(
+    ensure(
+        masses.host is None,
+        around.fault(
             "kind",
             'given "central_gravity", but [body] host makes the body one of [[bodies]], which attract '
             'each other anyway; give "gravity_gradient"',
-        )
+        ),
+    )
     place = FlownByMass(masses, number)
     return Attraction(gravitational_parameter=masses.strengths[number], placement=place, pulls=True)
 

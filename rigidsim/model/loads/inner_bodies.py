@@ -40,7 +40,7 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.errors import ConfigError, Problem, required
+from rigidsim.errors import ConfigError, Problem, ensure, required
 from rigidsim.model.kinematics import Kinematics, in_common_unit
 from rigidsim.model.load import Load, Term
 from rigidsim.model.names import in_si, written
@@ -83,19 +83,25 @@ class Rotor(Load):
     def resolve(cls, fields: RotorTable, around: Setting) -> Rotor:
         context, body = around.context, around.body
         axis, moment = [x.at(context) for x in fields.axis], fields.moment.at(context)
-        if min(body.principal_moments) == 0:
-            raise around.fault(
+        ensure(
+            min(body.principal_moments) != 0,
+            around.fault(
                 "",
                 "given in a body without a moment about one of its axes, which a rotor can't turn; "
                 "remove the rotor, or give the body all three moments",
-            )
-        if moment == 0 and not fields.fixed:
-            raise around.fault("moment", "given 0; a positive moment is allowed")
-        if fields.fixed and fields.torque is not None:
-            raise around.fault(
+            ),
+        )
+        ensure(
+            moment != 0 or fields.fixed,
+            around.fault("moment", "given 0; a positive moment is allowed"),
+        )
+        ensure(
+            not fields.fixed or fields.torque is None,
+            around.fault(
                 "torque",
                 "given with fixed = true, which keeps the rate by whatever torque that takes; remove one",
-            )
+            ),
+        )
         own = dot(axis, apply(body.inertia, axis)) / dot(axis, axis)
         if moment > own:
             raise around.fault(
@@ -328,30 +334,36 @@ class FluidCore(Load):
         moment, flattening, friction = (
             x.at(context) for x in (table.moment, table.flattening, table.friction)
         )
-        if any(x != 0 for x in body.center_of_mass):
-            raise ConfigError(
+        ensure(
+            all(x == 0 for x in body.center_of_mass),
+            ConfigError(
                 Problem(
                     "[body] core",
                     "given for a body that turns about another point than its centre of mass, about which "
                     "a core would turn; remove reference or center_of_mass",
                 )
-            )
-        if fields.initial.angular_momentum is not None and table.angular_velocity is not None:
-            raise ConfigError(
+            ),
+        )
+        ensure(
+            fields.initial.angular_momentum is None or table.angular_velocity is None,
+            ConfigError(
                 Problem(
                     "[initial] angular_momentum",
                     "given with angular_velocity of [body] core, from which the body's own would follow; "
                     "give angular_velocity here, too",
                 )
-            )
-        if fields.initial.equilibrium is not None:
-            raise ConfigError(
+            ),
+        )
+        ensure(
+            fields.initial.equilibrium is None,
+            ConfigError(
                 Problem(
                     "[initial] equilibrium",
                     "given for a body with a fluid core, and equilibria are found for rigid bodies; give "
                     "the attitude and rates themselves",
                 )
-            )
+            ),
+        )
         largest = context.maximum(body.principal_moments)
         axis = unique_axis(body, context, largest=True)
         if axis is None and flattening != 0 and moment != 0:

@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, cast
 import heyoka as hy
 from pydantic import Field, StrictInt, Tag
 
-from rigidsim.errors import required
+from rigidsim.errors import ensure, required
 from rigidsim.model.harmonics import TurningHarmonics
 from rigidsim.model.kinematics import Kinematics, along_axes
 from rigidsim.model.load import Term
@@ -133,12 +133,14 @@ def _refuse_elsewhere(fields: MagneticFieldFields, around: Setting) -> None:
         why = "has a position, where the field is taken: remove it and gravitational_parameter"
         why = why if around.free_flight else "is one of [[bodies]]; a uniform field is allowed"
         raise around.fault(fields.elements.key, f"given for a body that {why}")
-    if fields.field_degree is not None and fields.field != IGRF:
-        raise around.fault("field_degree", f'given without field = "{IGRF}", whose degree it is; remove it')
-    if fields.elements is None and fields.gravitational_parameter is not None:
-        raise around.fault(
-            "gravitational_parameter", "given without an orbit, whose period it is for; remove it"
-        )
+    ensure(
+        fields.field_degree is None or fields.field == IGRF,
+        around.fault("field_degree", f'given without field = "{IGRF}", whose degree it is; remove it'),
+    )
+    ensure(
+        fields.elements is not None or fields.gravitational_parameter is None,
+        around.fault("gravitational_parameter", "given without an orbit, whose period it is for; remove it"),
+    )
     if fields.of_place and fields.elements is None and not around.free_flight:
         key = "field" if fields.field == IGRF else "source_moment"
         raise around.fault(
@@ -146,11 +148,13 @@ def _refuse_elsewhere(fields: MagneticFieldFields, around: Setting) -> None:
             "given for a body without a place; give [initial] position and velocity, or source_moment "
             "with an orbit, or a uniform field",
         )
-    if fields.position is not None and not (around.free_flight and fields.of_place):
-        raise around.fault(
+    ensure(
+        fields.position is None or (around.free_flight and fields.of_place),
+        around.fault(
             "position",
             f'given; allowed with source_moment or "{IGRF}", for a body with [initial] position and velocity',
-        )
+        ),
+    )
 
 
 # --- fields -------------------------------------------------------------------------------------------------
@@ -296,8 +300,10 @@ def _flown_about(fields: MagneticFieldFields, around: Setting) -> FlownAbout:
             "which "
             f"isn't the Earth; give source_moment, or {EARTH.gravitational_parameter:g} m^3/s^2",
         )
-    if centre == around.position:
-        raise around.fault("position", "the body starts at the dipole; start it elsewhere")
+    ensure(
+        centre != around.position,
+        around.fault("position", "the body starts at the dipole; start it elsewhere"),
+    )
     return FlownAbout(strengths[0] if len(strengths) == 1 else None, centre)
 
 

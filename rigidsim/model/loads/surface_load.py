@@ -37,7 +37,7 @@ import heyoka as hy
 import numpy as np
 from pydantic import Field, StrictBool
 
-from rigidsim.errors import ConfigError, Problem, required
+from rigidsim.errors import ConfigError, Problem, ensure, required
 from rigidsim.model.kinematics import Kinematics, along_axes
 from rigidsim.model.load import Load, Term, loads_of
 from rigidsim.model.loads.applied import Applied
@@ -359,12 +359,14 @@ class Pushes:
     def surfaces(self) -> Iterator[tuple[int, OuterSurface]]:
         """Surfaces of the body, counted from 1; refused if there are none."""
         body = self.around.body
-        if not body.surfaces:
-            raise self.around.fault(
+        ensure(
+            body.surfaces,
+            self.around.fault(
                 "",
                 "given for a body without surfaces; give [[body.surfaces]], such as normal and area of "
                 "a plate, size of a box, or radius of a sphere",
-            )
+            ),
+        )
         yield from enumerate(body.surfaces, start=1)
 
     def on_sphere(self, sphere: OuterSurface, size: Any, *, speed: bool = False) -> None:
@@ -459,12 +461,14 @@ class Drag(SurfaceLoad):
 
     @classmethod
     def resolve(cls, fields: DragFields, around: Setting) -> Drag:
-        if not around.free_flight or RELATIVE_NAMES[0] not in around.names:
-            raise around.fault(
+        ensure(
+            around.free_flight and RELATIVE_NAMES[0] in around.names,
+            around.fault(
                 "",
                 "given without a velocity relative to the air; it takes [initial] position and "
                 "velocity, and a central_gravity (atmosphere_rate there turns the air)",
-            )
+            ),
+        )
         pushes = Pushes(around, cls.title, RELATIVE_NAMES)
         half, factors, law = around.context.one / 2, [], None
         if (fields.density == NRLMSISE) != (fields.ap is not None):
@@ -564,15 +568,17 @@ def _falling(fields: DragFields, around: Setting) -> list[Expression]:
     """The factor by which the density falls with the altitude, if it does."""
     if fields.scale_height is None or fields.altitude is None:
         return []
-    if not isinstance(fields.density, ExactNumber):
-        raise around.fault(
+    ensure(
+        isinstance(fields.density, ExactNumber),
+        around.fault(
             "scale_height",
             "given with an expression for density, which determines its fall; remove it and altitude",
-        )
-    if "altitude" not in around.names:
-        raise around.fault(
-            "altitude", "given without a surface to count from; give the central_gravity a radius"
-        )
+        ),
+    )
+    ensure(
+        "altitude" in around.names,
+        around.fault("altitude", "given without a surface to count from; give the central_gravity a radius"),
+    )
     given = {"base": fields.altitude.alone, "scale_height": fields.scale_height.alone}
     return [around.expression("drag", "exp((base - altitude)/scale_height)", parameters=given)]
 
