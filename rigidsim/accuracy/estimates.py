@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -29,7 +29,7 @@ from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import acts_at_moments_alone
 from rigidsim.solve.batch.family import BatchBlock, Family
 from rigidsim.solve.closed_form import ClosedForm, NoClosedForm, closed_form_of
-from rigidsim.solve.compiled import compiled_function, evaluate_rows, interruptible
+from rigidsim.solve.compiled import compiled_function, interruptible
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.effects.waypoints import SampleTrail, Waypoint, Waypoints
 from rigidsim.solve.error_tangents import (
@@ -112,7 +112,6 @@ def closed_form_if_any(scene: Scene, *, driven: bool = False) -> tuple[ClosedFor
 
 DOUBLE = float(np.finfo(float).eps)
 _LARGEST_EXPONENT = 600.0  # keeps products within doubles
-_VECTORS = {"rates": ("wx", "wy", "wz"), "position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz")}
 
 LAST_BITS = 0.5  # epsilons by which a recorded value is wrong at most because it is rounded
 LABEL = 0.25  # the same for a sample's time: what is recorded belongs to another moment
@@ -403,24 +402,14 @@ def _quantities(system: System, precision: Precision, states: np.ndarray) -> dic
     """The quaternion (n, 4), or a direction (n, 3), and vectors (n, 3) in SI, of states (n, states); of a
     frame that turns with time all at one time, which changes no distance.
     """
-    places = {
-        name: system.states.index(name) for of in _VECTORS.values() for name in of if name in system.states
-    }
-    read = {
-        name: [system.variables[places[x]] for x in of] for name, of in _VECTORS.items() if of[0] in places
-    }
-    if (attitude := system.mechanics.attitude) is not None:
-        read["attitude"] = attitude.quaternion or attitude.variables
-    every = [x for expressions in read.values() for x in expressions]
-    function = compiled_function(every, system.variables, compact_mode=True, **precision.options)
-    values = evaluate_rows(function, states, times=np.zeros(len(states))).T
-    found, first = {}, 0
-    for name, expressions in read.items():
-        found[name] = values[:, first : first + len(expressions)]
-        first += len(expressions)
-        if name in _VECTORS:
-            sizes = [math.ldexp(1.0, int(system.state_exponents[places[x]])) for x in _VECTORS[name]]
-            found[name] = found[name] * np.array([precision.of_double(x) for x in sizes])
+    measures, found = Measures(system), {}
+    for name, places in measures.places.items():
+        if not places or name == "attitude":
+            continue
+        sizes = [precision.of_double(math.ldexp(1.0, int(system.state_exponents[i]))) for i in places]
+        found[name] = states[:, places] * np.array(sizes)
+    if measures.carried:
+        found["attitude"] = measures.attitudes(states, **precision.options).T
     return found
 
 
@@ -458,7 +447,13 @@ def _by_tangents(run: _Run) -> _Seen:
     prepared, system, scaling = run.prepared, run.system, run.system.scaling
     epsilon = float(prepared.precision.epsilon)
     start, end = (math.ldexp(time, run.shift) for time in (run.start, run.end))
-    with _borrowed(run.stepper):
+    with ExitStack() as put_back:  # the stepper is used without leaving a trace
+        if (stepper := run.stepper) is not None:
+            log = stepper.log
+            put_back.callback(stepper.back_to, stepper.mark())
+            put_back.callback(log.found.__setitem__, slice(None), list(log.found))
+            put_back.callback(setattr, log, "muted", log.muted)
+            log.muted = True
         tangents = interruptible(lambda: _tangents_of(run, start, end))
         spread = tangents.follow(start + run.part * (end - start), run.go_on, math.pi / epsilon)
         followed = ["attitude" if run.carried else "rates"] + ["position"] * bool(
@@ -492,22 +487,6 @@ def _by_tangents(run: _Run) -> _Seen:
     over = f", over the first {100 * share:.2g} % of the run, after which no digit is left"
     how = "motions near this one, perturbed at random as rounding does"
     return replace(found, how=how + (over if lost and share < 1 else _over(share)))
-
-
-@contextmanager
-def _borrowed(stepper: TaylorStepper | None) -> Iterator[None]:
-    """Use a run's stepper inside the block without leaving a trace."""
-    if stepper is None:
-        yield
-        return
-    log = stepper.log
-    mark, found, muted = stepper.mark(), list(log.found), log.muted
-    log.muted = True
-    try:
-        yield
-    finally:
-        log.muted, log.found[:] = muted, found
-        stepper.back_to(mark)
 
 
 def _tangents_of(run: _Run, start: float, end: float) -> ErrorTangents:

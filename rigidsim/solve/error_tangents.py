@@ -506,20 +506,24 @@ class Measures:
         return found
 
     def _angles_between(self, states: np.ndarray, apart: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-        """Angles (motions, others), rad, between the attitudes, all at one time: a frame that turns with time
-        doesn't change their distances.
-        """
+        """Angles (motions, others), rad, between the attitudes."""
         if self._chord is not None:
             return np.asarray(self._chord * np.sqrt((apart[self.places["attitude"]] ** 2).sum(axis=0)))
-        assert self._attitude is not None
         _, motions, others = apart.shape
         every = np.concatenate([states[:, :, None], states[:, :, None] + apart], axis=2)
         read = np.repeat(parameters, others + 1, axis=1)
         rows = np.concatenate([every.reshape(len(states), -1), read]).T
-        quaternion, variables = self._attitude.quaternion, self._variables
-        function = compiled_function(quaternion, variables, compact_mode=True, fp_type=float)
-        found = evaluate_rows(function, rows, times=np.zeros(len(rows))).reshape(4, motions, -1)
+        found = self.attitudes(rows, fp_type=float).reshape(4, motions, -1)
         return np.asarray(2.0 * np.sqrt(((found[:, :, 1:] - found[:, :, :1]) ** 2).sum(axis=0)))
+
+    def attitudes(self, rows: np.ndarray, **options: Any) -> np.ndarray:
+        """Components (components, n) of the quaternion, or of a direction without one, of states and
+        parameters (n, both), all at one time: a frame that turns with time changes no distance.
+        """
+        assert self._attitude is not None
+        read = self._attitude.quaternion or self._attitude.variables
+        function = compiled_function(read, self._variables, compact_mode=True, **options)
+        return evaluate_rows(function, rows, times=np.zeros(len(rows)))
 
 
 class Spread:
