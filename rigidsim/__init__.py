@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from rigidsim.workflows.physics import required_physics
     from rigidsim.workflows.plan import plan
     from rigidsim.workflows.read import Experiment, load, parse
-    from rigidsim.workflows.resume import resume
-    from rigidsim.workflows.run import run
+    from rigidsim.workflows.run import resume, run
     from rigidsim.workflows.sweeps.sweep import sweep
     from rigidsim.workflows.tradeoff import tradeoff
     from rigidsim.workflows.verify import verify
@@ -45,8 +44,7 @@ _NAMES = {
     "workflows.physics": ("required_physics",),
     "workflows.plan": ("plan",),
     "workflows.read": ("Experiment", "load", "parse"),
-    "workflows.resume": ("resume",),
-    "workflows.run": ("run",),
+    "workflows.run": ("resume", "run"),
     "workflows.sweeps.sweep": ("sweep",),
     "workflows.tradeoff": ("tradeoff",),
     "workflows.verify": ("verify",),

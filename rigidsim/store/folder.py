@@ -163,7 +163,7 @@ class WorkFolder:
 
     def remove_torn(self) -> None:
         """Delete partial files that a killed process was writing or deleting."""
-        for folder in (self.path, *(path for path in self.path.glob("*") if path.is_dir())):
+        for folder in (self.path, *(self.path / name for name in self.holds)):
             for path in (*folder.glob(".*.partial"), *folder.glob(".timeline.rrd.*.part")):
                 if not (self.shared and Path(f"/proc/{path.name.split('.')[-2]}").exists()):
                     path.unlink(missing_ok=True)

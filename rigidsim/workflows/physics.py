@@ -40,8 +40,7 @@ from rigidsim.store.outputs import refuse_inputs, refuse_loss, writing
 from rigidsim.store.run import SavedRun
 from rigidsim.store.summary import Summary, SummaryPart
 from rigidsim.workflows.read import Given, as_experiment
-from rigidsim.workflows.resume import resume
-from rigidsim.workflows.run import run
+from rigidsim.workflows.run import resume, run
 
 _TITLES = {"loads": "", "rotors": "rotor ", "bodies": "attraction by the point mass "}
 """What tables of arrays are called before their names."""

@@ -13,7 +13,7 @@ import rigidsim
 from rigidsim.errors import ConfigError, RigidsimError, RunFolderError
 from rigidsim.workflows.fit import fitting
 from rigidsim.workflows.fit.estimation import inverse_right_jacobian
-from rigidsim.workflows.fit.predictions import ByDifferences
+from rigidsim.workflows.fit.observations import ByDifferences
 
 SPIN = 0.7  # rad/s about z
 SIGMA = 0.01  # rad

@@ -1,1 +1,1 @@
-"""What the commands do; ``rigidsim.cli.app`` declares their arguments, and imports them as needed."""
+"""What commands do and print; ``rigidsim.cli.app`` declares their arguments, and imports them as needed."""

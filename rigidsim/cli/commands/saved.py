@@ -1,12 +1,10 @@
 """Commands on a run, a sweep or a fit as it is saved, whichever it is: ``info``, ``resume``, ``verify``."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import rigidsim.workflows.resume as resuming
-import rigidsim.workflows.verify as verifying
 from rigidsim.cli.exits import refuse_options
 from rigidsim.cli.screens.page import Page, answer, print_json, reporting
 from rigidsim.cli.screens.summary import arcsec_text, print_run, print_summary, print_verdict
@@ -42,15 +40,20 @@ def resume(
     refuse_options(f"is for sweeps; {run_path} is a run, which one process integrates", workers=workers)
     if as_json:
         refuse_options("is for people, and --json always prints everything", verbose=verbose)
+    from rigidsim.workflows import run as running  # which loads what integrates
+
     with watched(None, True) as watching:
-        run = resuming.resume(run_path, until=until, overrides=overrides or [], observer=watching)
+        run = running.resume(run_path, until=until, overrides=overrides or [], observer=watching)
     return print_run(run, as_json, verbose=verbose)
 
 
 def verify(run_path: Path, members: int | None, back: bool, as_json: bool) -> int:
     """Make it again and compare."""
+    from rigidsim.workflows import verify as verifying
+
     folder = folder_at(run_path)
-    what = {FitFolder: "variable", SweepFolder: "member"}.get(type(folder), "sample")
+    kinds: dict[Any, str] = {FitFolder: "variable", SweepFolder: "member"}
+    what = kinds.get(type(folder), "sample")
     if what != "member":
         refuse_options(f"is for sweeps; {run_path} is compared as a whole", members=members)
     if what != "sample":

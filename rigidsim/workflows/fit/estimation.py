@@ -14,8 +14,14 @@ from functools import cached_property
 import numpy as np
 
 from rigidsim.errors import RigidsimError
-from rigidsim.workflows.fit.observations import Readings
-from rigidsim.workflows.fit.predictions import FitKeys, NotPredicted, Prediction, Predictor, difference
+from rigidsim.workflows.fit.observations import (
+    FitKeys,
+    NotPredicted,
+    Prediction,
+    Predictor,
+    Readings,
+    difference,
+)
 
 SINGULAR = 1e-7
 """Singular values of scaled columns below this share of the largest are taken for zero: correlations that

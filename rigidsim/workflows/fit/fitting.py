@@ -29,21 +29,19 @@ from rigidsim.store.summary import SummaryPart
 from rigidsim.workflows.fit.estimation import Ended, Solution, Weighing, consider_covariance, search
 from rigidsim.workflows.fit.observations import (
     QUATERNION,
+    ByDifferences,
+    ByTangents,
     DataFiles,
+    FitKey,
+    FitKeys,
+    Prediction,
+    Predictor,
     Readings,
     content,
     digest,
     files_beside,
     observing,
     read_readings,
-)
-from rigidsim.workflows.fit.predictions import (
-    ByDifferences,
-    ByTangents,
-    FitKey,
-    FitKeys,
-    Prediction,
-    Predictor,
 )
 from rigidsim.workflows.read import Given, as_experiment, load
 from rigidsim.workflows.run import run

@@ -14,7 +14,7 @@ from rigidsim.solve.lanes import recommended_width
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.summary import SummaryPart
 from rigidsim.store.sweeps.tiles import OF_FITS, RESERVED, SUFFIXES
-from rigidsim.workflows.fit.predictions import FitKeys
+from rigidsim.workflows.fit.observations import FitKeys
 from rigidsim.workflows.plan import RunPlan, plan
 from rigidsim.workflows.sweeps.members import batches_of, first_possible, markable, recording, why_alone
 

@@ -560,11 +560,10 @@ def _compute(
     todo = sum(int(sources.missing[blocks[number].start : blocks[number].stop].sum()) for number in ours)
     done = begun.members - todo if share is None else 0
     observer.started(folder.path, done + todo, done)
-    if workers is None:
-        results: Iterator[tuple[Any, bytes | None]] = ((task, leave_tile(*task)) for task in tasks())
-    else:  # tiles are sent back by workers that don't see the folder
-        results = workers.each(leave_tile if workers.local else sent_tile, tasks())
-    for task, image in results:
+    # tiles are sent back by workers that don't see the folder
+    compute: Callable[..., bytes | None] = leave_tile if workers is None or workers.local else sent_tile
+    here = ((task, compute(*task)) for task in tasks())
+    for task, image in here if workers is None else workers.each(compute, tasks()):
         if image is not None:
             atomic.write_bytes(task[0], image)
         done += len(task[3])
