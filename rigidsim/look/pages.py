@@ -200,7 +200,9 @@ def _from_to(rows: xarray.Dataset, words: str, plot: Plot | None) -> Iterator[tu
     """Extremes of each curve of a plot, and how long it takes to swing between them and back; the first and
     last value of one that goes one way.
     """
-    for column, label in zip(plot.values.T, plot.labels, strict=False) if plot else ():
+    if plot is None:
+        return
+    for column, label in zip(plot.values.T, plot.labels, strict=False):
         values = column[np.isfinite(column)]
         if not len(values):
             continue

@@ -18,7 +18,8 @@ from rigidsim.scene.epochs import J2000
 from rigidsim.scene.readable import YEAR, TimeUnit, epoch_of, julian_year, unit_of
 from rigidsim.scene.space_axes import CELESTIAL, EQUATOR, obliquity, to_equator
 
-P, T = ParamSpec("P"), TypeVar("T")
+P = ParamSpec("P")
+T = TypeVar("T")
 _ORBIT_NORM = re.compile(r"orbit_norm_(\d+)")
 _IN_WORDS = {"energy_balance": "energy less work"}
 _AVERAGED = ("spin_averaged", "orbit_averaged")  # model levels whose datasets have axes but no attitude

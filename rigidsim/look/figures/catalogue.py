@@ -103,11 +103,11 @@ def _plot(axes: Axes, dataset: xarray.Dataset, plot: Plot, *, dense: bool) -> No
     if plot.log and (plot.band is not None or (plot.values > 0).any()):
         axes.set_yscale("log")
     if plot.band is not None:
-        low = np.nanpercentile(plot.values, 1) if np.isfinite(plot.values).any() else plot.band[0][0]
+        least = np.nanpercentile(plot.values, 1) if np.isfinite(plot.values).any() else plot.band[0][0]
         # what cancels to far less than a rounding says nothing
-        low = max(min(low, plot.band[0][0]), 0.02 * plot.band[0][0]) / 5
-        axes.fill_between(time, low, plot.band[1], color="#e9edf2", lw=0, zorder=0)
-        axes.set_ylim(low)
+        bottom = max(min(least, plot.band[0][0]), 0.02 * plot.band[0][0]) / 5
+        axes.fill_between(time, bottom, plot.band[1], color="#e9edf2", lw=0, zorder=0)
+        axes.set_ylim(bottom)
     if plot.steady is not None:
         axes.set_ylim(*plot.steady)
     if plot.from_zero:
@@ -124,7 +124,7 @@ def _crossings(column: Array) -> int:
 def _path(axes: Axes, path: PlanePath) -> None:
     """Draw a path, a cross at the origin as its center, and what is beside it."""
     style.trace(axes, *path.points.T, sparse=path.sparse)
-    faint = {"lw": 0.7, "alpha": 0.6, "zorder": 1, "sparse": path.sparse, "in_plane": True}
+    faint: dict[str, Any] = {"lw": 0.7, "alpha": 0.6, "zorder": 1, "sparse": path.sparse, "in_plane": True}
     for name, points in path.others.items():
         curve(axes, *points.T, color=paper(_HUES[name]), label=name, **faint)
     if path.ellipse is not None:
@@ -318,8 +318,9 @@ def _curve_panel(
         shown.draw_first(first, name, begins)
         first.set(ylabel="")
         first.set_title(f"the first {span_text(begins, 2)}", fontweight="normal", color=GREY)
-        if first.get_legend() is not None:
-            first.get_legend().remove()
+        legend = first.get_legend()
+        if legend is not None:
+            legend.remove()
 
 
 def time_axis(axes: Axes, dataset: xarray.Dataset, *, labelled: bool) -> None:
@@ -371,7 +372,8 @@ def darkened(figure: Figure) -> None:
             other = _BRIGHT if isinstance(artist, Text) else color
             artist.set_color(hues.get(color, other))  # type: ignore[attr-defined]
         elif isinstance(artist, LineCollection):  # from dark to light along time
-            artist.set_color(colormaps["plasma"](np.linspace(_DIM, 1.0, len(artist.get_segments()))))
+            shades = colormaps["plasma"](np.linspace(_DIM, 1.0, len(artist.get_segments())))
+            artist.set_color(shades.tolist())
         for effect in artist.get_path_effects() or ():  # the pale rim of letters on a light ground
             getattr(effect, "_gc", {}).update(foreground=_DARK)
     for axes in figure.axes:

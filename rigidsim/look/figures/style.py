@@ -118,11 +118,14 @@ def blank(dataset: xarray.Dataset, width: float, height: float) -> Figure:
     whole = height + top
     engine = ConstrainedLayoutEngine(h_pad=0.09, w_pad=0.09, rect=(0.0, 0.0, 1.0, 1.0 - top / whole))
     figure = ShownFigure(figsize=(width, whole), layout=engine)
-    for words, down, style in (
-        (title, 0.12, {"fontsize": 13.5, "fontweight": "bold", "color": INK}),
-        (description, _HEADING[0] + 0.07, {"fontsize": 10, "color": GREY}),
+    for words, down, size, weight, color in (
+        (title, 0.12, 13.5, "bold", INK),
+        (description, _HEADING[0] + 0.07, 10.0, "normal", GREY),
     ):
-        text = figure.text(0.14 / width, 1 - down / whole, words, va="top", gid="heading", **style)
+        text = figure.text(
+            0.14 / width, 1 - down / whole, words, va="top", gid="heading", fontsize=size, fontweight=weight,
+            color=color,
+        )  # fmt: skip
         share = (width - 0.28) * figure.dpi / max(text.get_window_extent().width, 1.0)
         if share < 1:
             text.set_text(textwrap.shorten(words, int(0.97 * share * len(words)), placeholder=" …"))

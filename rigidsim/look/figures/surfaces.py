@@ -284,7 +284,7 @@ def _poinsot(axes: Axes, radii: Array, traced: Array, points: Array, turn: Array
     axes.plot(*np.stack([np.zeros(2), view.flat(tip)]).T, color=PINK, lw=1.3, zorder=5)
     place = view.flat(np.array([0.0, 0.0, 1.25 * depth]))
     axes.plot(*np.stack([np.zeros(2), place]).T, color=GREY, lw=1.1, ls=(0, (4, 2)), zorder=5)
-    axes.text(*place, "L", color=GREY, ha="center", va="top", fontsize=9.5, fontweight="bold")
+    axes.text(place[0], place[1], "L", color=GREY, ha="center", va="top", fontsize=9.5, fontweight="bold")
     key(axes, "It rolls on the invariable plane (Poinsot)")
 
 

@@ -319,13 +319,13 @@ def _points(dataset: xarray.Dataset, variable: xarray.DataArray, members: list[A
         still = np.ptp(known, axis=0) <= _STILL * np.abs(known).max() if len(known) else [False] * len(rows.T)
         both = sorted(np.argsort(still, kind="stable")[:2].tolist())
         names = [" ".join(parts) for parts in product(*(variable[dim].values for dim in rest))]
-        (x, y), hue = rows[:, both].T, which
+        x, y = rows[:, both].T
         across, up = (f"{_named(variable)}, {names[k]}" for k in both)
     else:
         alone = len(members) == 1
-        x, y, hue = (members[0].place if alone else np.arange(len(table)))[which], rows[:, 0], GREY
+        x, y = (members[0].place if alone else np.arange(len(table)))[which], rows[:, 0]
         across, up = members[0].label if alone else "member", _named(variable)
-    axes.scatter(x, y, c=hue, s=2.5, lw=0, rasterized=True)
+    axes.scatter(x, y, c=which if rows.shape[1] > 1 else GREY, s=2.5, lw=0, rasterized=True)
     axes.set(xlabel=across, ylabel=up)
     titled(axes, _title(variable) + ("; coloured by member" if rows.shape[1] > 1 else ""))
     return figure

@@ -121,7 +121,7 @@ def _legend(axes: Axes, dataset: xarray.Dataset, *, short: bool) -> None:
     handles = [Line2D([], [], linestyle="none", label=text, markersize=7, **look) for text, look in entries]
     handles.append(Line2D([], [], color=_FRONT, linewidth=1.1, label="best of all (numbered)"))
     # models are cheap, and not exact; another tool's file may be anywhere
-    place = "best" if others else "lower left" if models else "upper right"
+    place: Any = "best" if others else "lower left" if models else "upper right"
     axes.legend(handles=handles, loc=place, ncols=2, fontsize=8, frameon=True, framealpha=0.9)
 
 
