@@ -22,7 +22,7 @@ from rigidsim.scene.fields import NAME_OR_VECTOR
 from rigidsim.scene.kernels.reading import EMBEDDED, KernelError, find_file, folders_of
 from rigidsim.scene.paths import leaves
 from rigidsim.scene.registry import LOADS
-from rigidsim.scene.schema import Config, TableText, config_model
+from rigidsim.scene.schema import Config, TableText, config_error, config_model
 from rigidsim.scene.toml_text import (
     FLAG,
     apply_overrides,
@@ -33,7 +33,6 @@ from rigidsim.scene.toml_text import (
     toml_text,
     written,
 )
-from rigidsim.scene.validation_errors import config_error
 
 Overrides = Sequence[str] | Mapping[str, Any]
 """Values to replace: ``KEY=VALUE`` texts, or dotted keys with Python values."""

@@ -10,9 +10,9 @@ from support import cases, run_text
 import rigidsim
 from rigidsim import ConfigError
 from rigidsim.scene.arithmetic import context_for
-from rigidsim.scene.earth_axes import earth_axes
 from rigidsim.scene.epochs import parse_epoch
 from rigidsim.scene.scene import start_values
+from rigidsim.scene.space_axes import earth_axes
 from rigidsim.solve.problem import prepare
 
 PYMSIS = {

@@ -10,8 +10,8 @@ from support import cases
 import rigidsim
 from rigidsim import ConfigError
 from rigidsim.scene.arithmetic import context_for
-from rigidsim.scene.earth_axes import earth_axes
 from rigidsim.scene.epochs import parse_epoch
+from rigidsim.scene.space_axes import earth_axes
 from rigidsim.solve.problem import prepare
 
 PPIGRF = {

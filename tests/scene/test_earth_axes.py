@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from rigidsim.scene.arithmetic import context_for
-from rigidsim.scene.earth_axes import earth_axes
 from rigidsim.scene.epochs import parse_epoch
+from rigidsim.scene.space_axes import earth_axes
 
 ARCSEC = np.pi / (180 * 3600)
 

@@ -26,7 +26,6 @@ from rigidsim.model.sources import free_flight, in_body_axes, read_in
 from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, norm, transpose, unit_vectors
 from rigidsim.scene.bodies.presets import EARTH
-from rigidsim.scene.earth_axes import earth_axes, rotation_rate
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import PLACES, NameProvider, Readable, provides
@@ -52,6 +51,7 @@ from rigidsim.scene.readable import length_text, value_text
 from rigidsim.scene.registry import EffectPart, Setting, degree_parts, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
+from rigidsim.scene.space_axes import earth_axes, rotation_rate
 from rigidsim.scene.swept import plain
 
 FIELD_NAMES = ("bx", "by", "bz")

@@ -52,7 +52,6 @@ from rigidsim.scene.arithmetic import apply as multiply
 from rigidsim.scene.bodies.outside import OuterSurface, Plate
 from rigidsim.scene.bodies.presets import EARTH, known_body
 from rigidsim.scene.cautions import Caution
-from rigidsim.scene.earth_axes import earth_axes, rotation_rate
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import PLACES, NameProvider, Readable, provides
 from rigidsim.scene.expressions.tree import Expression, evaluate, names_used, states_read
@@ -72,6 +71,7 @@ from rigidsim.scene.readable import length_text, value_text
 from rigidsim.scene.registry import EffectPart, LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene, start_values
 from rigidsim.scene.schema import Config
+from rigidsim.scene.space_axes import earth_axes, rotation_rate
 from rigidsim.scene.surfaces import WIDE, narrow_parts, root_parts
 from rigidsim.scene.swept import plain
 
