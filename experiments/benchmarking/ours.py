@@ -23,7 +23,6 @@ def in_a_folder(config: Path, out: Path) -> dict[str, float]:
         import xarray
 
         import rigidsim.look.timeline
-        import rigidsim.look.timeline.blueprint
 
         xarray.Variable((), 0.0)  # imports dask where it is installed
     run, parse = rigidsim.run, rigidsim.parse

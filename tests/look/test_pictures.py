@@ -19,9 +19,8 @@ from support import cases
 import rigidsim
 from rigidsim.look.film import HeadlessViewer, NoGraphics, vulkan_drivers
 from rigidsim.look.timeline import write_timeline
-from rigidsim.look.timeline.blueprint import build_blueprint
 from rigidsim.look.timeline.drawn import DrawnRun
-from rigidsim.look.timeline.writing import recording_to
+from rigidsim.look.timeline.writing import build_blueprint, recording_to
 
 pytestmark = [
     pytest.mark.skipif(not vulkan_drivers(), reason="no Vulkan driver: apt-get install mesa-vulkan-drivers"),

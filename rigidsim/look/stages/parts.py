@@ -141,17 +141,19 @@ def around(place: str, name: str) -> str:
     return f"{place}/around/{name}".lstrip("/")
 
 
+def moving(kind: Any, **arrays: Array) -> Callable[[Rows], Columns]:
+    """Columns of an archetype whose components are the rows of arrays."""
+    return lambda rows: kind.columns(**{key: value[rows] for key, value in arrays.items()})
+
+
 def frame(name: str, **turning: Array | None) -> list[Part]:
     """A frame, the body or its reference point, by the `quaternion` (rows, 4), x y z w, `translation` and
     `scale` (rows, 3) that aren't None.
     """
     # in one call: apart, the viewer would see states that never were
     given = {key: value.astype(np.float32) for key, value in turning.items() if value is not None}
-
-    def columns(rows: Rows) -> Columns:
-        return rr.Transform3D.columns(**{key: value[rows] for key, value in given.items()})
-
-    return [Part(name, (), columns, next(iter(given.values())))] if given else []
+    shown = moving(rr.Transform3D, **given)
+    return [Part(name, (), shown, next(iter(given.values())))] if given else []
 
 
 def arrow(
@@ -187,9 +189,7 @@ def trail(
     line = joined(points, NEAR)
     # a cloud of points needs no more of them
     stride = _stride_of(points - whole.mean(axis=0), _SMOOTH) if line else -(-len(points) // SCENE_ROWS)
-
-    def dots(rows: Rows) -> Columns:
-        return rr.Points3D.columns(positions=points[rows].astype(np.float32))
+    dots = moving(rr.Points3D, positions=points.astype(np.float32))
 
     def pieces(rows: Rows) -> Columns:
         return rr.LineStrips3D.columns(strips=_pieces(points, rows, stride))
@@ -206,8 +206,8 @@ def trail(
             else rr.Points3D(whole, colors=dark, radii=points_wide(1.0))
         )
         found.append(Part(f"{path}/whole", [drawn]))
-    kind, moving = (rr.LineStrips3D, pieces) if line else (rr.Points3D, dots)
-    recent = Part(f"{path}/recent", style(kind, 1.8), moving, points, words, color, stride, lasting=lasting)
+    kind, shown = (rr.LineStrips3D, pieces) if line else (rr.Points3D, dots)
+    recent = Part(f"{path}/recent", style(kind, 1.8), shown, points, words, color, stride, lasting=lasting)
     return [*found, recent, *([Part(f"{path}/head", style(rr.Points3D, 4.5), dots)] if head else [])]
 
 

@@ -28,6 +28,7 @@ from rigidsim.look.stages.parts import (
     Picture,
     Rows,
     Stage,
+    moving,
     points_wide,
     screen_seconds,
 )  # fmt: skip
@@ -282,12 +283,9 @@ def plot_parts(plot: Plot) -> list[Part]:
         "widths": [1.5] * len(plot.labels),
     }
 
-    def columns(rows: Rows) -> Columns:
-        values = shown[rows]
-        if plot.error is None:
-            return rr.Scalars.columns(scalars=values)
+    def banded(rows: Rows) -> Columns:
         # a band of their uncertainty: the viewer draws the root of a variance
-        variances = np.repeat(plot.error[rows] ** 2, count)
+        values, variances = shown[rows], np.repeat(need(plot.error)[rows] ** 2, count)
         found = rr.Measurements.columns(values=values.ravel(), variances=variances)
         return found.partition([count] * len(values))
 
@@ -295,20 +293,16 @@ def plot_parts(plot: Plot) -> list[Part]:
     # amplitude; of a drift only the largest counts
     policies = rr.components.AggregationPolicy
     policy = policies.Max if plot.place == "drift" else policies.MinMax
-    look: rr.AsComponents = rr.Measurements.from_fields(**style)
+    found = [Part(path, [rr.Measurements.from_fields(**style)], banded)]
     if plot.error is None:
-        look = rr.SeriesLines(**style, aggregation_policy=policy)
-    found = [Part(path, [look], columns)]
+        look, curves = rr.SeriesLines(**style, aggregation_policy=policy), moving(rr.Scalars, scalars=shown)
+        found = [Part(path, [look], curves)]
     for number, (label, value) in enumerate(plot.levels.items()):
         line = rr.SeriesLines(names=[label], colors=[screen("grey")], widths=[1.0])
-        level = np.full(len(shown), np.log10(value) if plot.log else value)
-        moving, ends = _scalars(level), np.array([0, len(shown) - 1])
-        found.append(Part(f"{path}/level{number}", [line], moving, only=ends))
+        level = moving(rr.Scalars, scalars=np.full(len(shown), np.log10(value) if plot.log else value))
+        ends = np.array([0, len(shown) - 1])
+        found.append(Part(f"{path}/level{number}", [line], level, only=ends))
     return found
-
-
-def _scalars(values: Array) -> Callable[[Rows], Columns]:
-    return lambda rows: rr.Scalars.columns(scalars=values[rows])
 
 
 def plane_parts(plane: Path) -> list[Part]:
@@ -337,10 +331,7 @@ def plane_parts(plane: Path) -> list[Part]:
         found.append(Part(f"{root}/rings/{number}/label", [_texts(place, [label.strip()])]))
     if plane.moves:
         dot = rr.Points2D.from_fields(colors=[bright], radii=points_wide(5.0), draw_order=3.0)
-
-        def now(rows: Rows) -> Columns:
-            return rr.Points2D.columns(positions=points[rows].astype(np.float32))
-
+        now = moving(rr.Points2D, positions=points.astype(np.float32))
         found.append(Part(f"{root}/now", [dot], now))
     return found
 
