@@ -26,14 +26,15 @@ def runs_of(paths: Sequence[Path], members: Sequence[int] = ()) -> list[tuple[st
     """Runs with their names on the screen, each different; with ``members``, runs of one sweep."""
     if members:
         return _members(paths, members)
-    runs = [*map(_shown, paths)]
+    runs = [*map(shown, paths)]
     names = [run.outcome.name for run in runs]
     if len(set(names)) < len(names):
         names = [run.place for run in runs]
     return list(zip(names, runs, strict=True))
 
 
-def _shown(path: Path) -> Run:
+def shown(path: Path) -> Run:
+    """A run, the motion of a fit, or another tool's file; a sweep is refused."""
     folder = folder_at(path)
     if isinstance(folder, SweepFolder):
         raise RunFolderError(

@@ -54,6 +54,7 @@ QUICK = {
     "fit nights.toml --member 1 --out fits": 0,
     "info fits/watched --json": 0,
     "verify fits/watched --json": 0,
+    "plot fits/watched --out fit.png": 0,
     "info runs/free --json": 0,
     "info runs/swept --json": 0,
     "plot runs/free --what drift --out drift.png": 0,

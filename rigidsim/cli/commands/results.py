@@ -18,7 +18,7 @@ from rigidsim.store.outputs import ANALYSIS, refuse_loss, writing
 from rigidsim.store.run import SavedRun, ShownRun
 from rigidsim.store.sweeps.saved import SavedSweep, open_saved, open_sweep
 from rigidsim.workflows.compare.as_run import open_any
-from rigidsim.workflows.view import render, runs_of, show
+from rigidsim.workflows.view import render, runs_of, show, shown
 
 ALL = "all"
 
@@ -62,7 +62,7 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None, for_slides: s
     swept = isinstance(folder_at(run_path), SweepFolder)
     if swept or SPECTRUM in (what or []):
         refuse_options("is for figures of a single run other than spectrum", for_slides=for_slides)
-    saved = open_sweep(run_path) if swept else open_any(run_path)
+    saved = open_sweep(run_path) if swept else shown(run_path)
     _report_notes(saved)
     wanted = list(dict.fromkeys(what or []))
     try:
