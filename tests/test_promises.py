@@ -17,8 +17,8 @@ import rigidsim
 import rigidsim.workflows.read  # everything is registered
 from rigidsim.cli.app import app
 from rigidsim.scene.cautions import WarningCode
-from rigidsim.scene.editor_schema import editor_schema
 from rigidsim.scene.registry import OBSERVABLES
+from rigidsim.scene.schema import editor_schema
 from rigidsim.solve.status import Status
 from rigidsim.store.variables import LABELS
 

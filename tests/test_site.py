@@ -60,8 +60,8 @@ def test_a_built_site_is_checked_as_a_reader_finds_it(tmp_path: Path) -> None:
 
 def test_the_reference_has_every_key_command_and_variable(pages: Path) -> None:
     from rigidsim.cli.app import app
-    from rigidsim.scene.editor_schema import editor_schema
     from rigidsim.scene.registry import OBSERVABLES
+    from rigidsim.scene.schema import editor_schema
 
     config, commands, dataset = (
         (pages / "reference" / f"{name}.md").read_text(encoding="utf-8")

@@ -42,7 +42,7 @@ def code(value: str) -> str:
 def config_page() -> str:
     """Every key of every table."""
     import rigidsim.workflows.read  # noqa: F401  (every kind of load is registered)
-    from rigidsim.scene.editor_schema import editor_schema
+    from rigidsim.scene.schema import editor_schema
 
     schema = editor_schema()
     parts = [

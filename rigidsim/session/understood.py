@@ -8,7 +8,14 @@ from rigidsim.model.load import Load, loads_of
 from rigidsim.model.load_estimate import effects_at_start
 from rigidsim.model.loads.gravity import UniformGravity
 from rigidsim.model.placements import FlownByKernel
-from rigidsim.model.plausibility import about_load, about_named_strength
+from rigidsim.model.plausibility import (
+    about_load,
+    about_named_strength,
+    suspicious_angles,
+    suspicious_end,
+    suspicious_expressions,
+    unreachable_events,
+)
 from rigidsim.model.sources import sources_of
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, norm, working_bits
@@ -19,12 +26,6 @@ from rigidsim.scene.readable import TimeWords, length_text, number_text
 from rigidsim.scene.registry import LOADS
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
-from rigidsim.scene.suspicions import (
-    suspicious_angles,
-    suspicious_end,
-    suspicious_expressions,
-    unreachable_events,
-)
 from rigidsim.scene.swept import plain
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.store.summary import Span, Start, Three, UnderstoodBody

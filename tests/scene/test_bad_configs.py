@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from rigidsim import ConfigError, load, parse
 from rigidsim.cli.app import app
-from rigidsim.scene.editor_schema import editor_schema
+from rigidsim.scene.schema import editor_schema
 from rigidsim.solve.problem import prepare
 
 GOOD = {

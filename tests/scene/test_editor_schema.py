@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from rigidsim.scene.editor_schema import editor_schema
+from rigidsim.scene.schema import editor_schema
 
 
 @pytest.fixture(scope="module")

@@ -18,8 +18,8 @@ from rigidsim.cli.screens.page import Page, Styled, answer, print_json, reportin
 from rigidsim.cli.screens.summary import arcsec_text, from_step, print_understood
 from rigidsim.errors import ConfigError, RigidsimError
 from rigidsim.scene.choices import method_named
-from rigidsim.scene.editor_schema import editor_schema
 from rigidsim.scene.readable import bytes_text, span_text
+from rigidsim.scene.schema import editor_schema
 from rigidsim.scene.sweep import Sweep
 from rigidsim.session.progress import clock_text
 from rigidsim.workflows.physics import ComparedModel, PhysicsPlan, required_physics
