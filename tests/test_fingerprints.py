@@ -74,7 +74,6 @@ USUAL = (  # of each kind one, cheap to compile; the others by hand, before vers
     "asymmetric_top",
     "earth_precession_averaged",
     "heavy_top_nutating",
-    "satellite_libration",
 )
 
 

@@ -57,7 +57,7 @@ def test_the_torque_is_that_of_the_differentiated_series_in_any_body_axes(degree
 
 
 def test_degrees_converge_to_a_body_of_point_masses() -> None:
-    """Torque and force by Newton's law; each degree leaves less by about the ratio of the radii."""
+    """Torque and force by Newton's law; two degrees more leave less by about the squared ratio of radii."""
     random = Random(3)
     masses, places = lumpy(random.generator)
     tensor, total = tensor_of(masses, places), float(masses.sum())
@@ -66,7 +66,7 @@ def test_degrees_converge_to_a_body_of_point_masses() -> None:
     force, torque = pulled(masses, places, source)
     body = f"inertia_tensor = {array(tensor)}\nmass = {total!r}\n{keys(field, 1.0)}"
     left = []
-    for degree in range(2, 9):
+    for degree in range(2, 9, 2):
         load = f'kind = "central_gravity"\ngravitational_parameter = 1\ndegree = {degree}\n'
         load += f"position = {array(source)}"
         start = "angular_velocity = [0, 0, 0]\nposition = [0, 0, 0]\nvelocity = [0, 0, 0]"

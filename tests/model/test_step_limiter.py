@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from equations import EPS
 from scipy.integrate import quad
-from support import EPSILON, cases, config
+from support import EPSILON, cases, config, run_text
 
 import rigidsim
 
@@ -100,9 +100,7 @@ def test_an_event_on_a_narrow_function_of_time(runs: Path) -> None:
         ("7668.6", 'record = ["quaternion"]\n[limits]\nmax_drift = 1e-3', {"work"}),
     ],
 )
-def test_orbits_through_air_carry_what_they_need(
-    speed: str, record: str, carried: set[str], runs: Path
-) -> None:
+def test_orbits_through_air_carry_what_they_need(speed: str, record: str, carried: set[str]) -> None:
     """And the summary says what isn't monitored."""
     text = config(
         "principal_moments = [1, 2, 3]\nmass = 4\n[[body.surfaces]]\nradius = 0.2",
@@ -113,9 +111,8 @@ def test_orbits_through_air_carry_what_they_need(
         ],
         "end = 60\nsamples = 2",
         output=record,
-        estimate=True,
     )
-    run = rigidsim.run(rigidsim.parse(text), out=runs, force=True)
+    run = run_text(text)
     assert {"work", "pace"} & set(run.summary["states"]) == carried
     assert ("energy_balance" in run.summary["invariants"]) == ("work" in carried)
     assert list(run.summary["unwatched"]) == ([] if "work" in carried else ["energy_balance"])

@@ -131,7 +131,7 @@ def test_a_full_disk_while_the_dataset_is_written(tmp_path: Path, monkeypatch: p
     """HDF5 would crash the process if it saw the error."""
     from rigidsim.store.atomic import Sink
 
-    text = text_with("end = 300\nsamples = 20001")
+    text = text_with("end = 60\nsamples = 4001")
     whole = rigidsim.run(rigidsim.parse(text), out=tmp_path / "whole")
     size = whole.folder.dataset.stat().st_size
     write = Sink.write
