@@ -4,13 +4,20 @@ exists is replaced by force alone, pictures apart.
 Every writer of such files asks here before it begins its work, and writes them here.
 """
 
+from __future__ import annotations
+
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rigidsim.errors import FORCE, OUT, RunFolderError
 from rigidsim.store import atomic
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
 
 ANALYSIS = "analysis.h5"
 """File of a run's folder that an analysis writes, and no command reads."""
@@ -81,6 +88,14 @@ def writing(path: Path, *, folder: bool = False) -> Iterator[Path]:
     except OSError as error:
         why = error.strerror or error
         raise RunFolderError(f"{path}: can't be written: {why}; give another name") from None
+
+
+def write_drawn(dataset: xarray.Dataset, path: Path, figure: Figure, picture: Path) -> None:
+    """Write a dataset and its figure, each of which appears only when complete."""
+    with writing(path) as new:
+        dataset.to_netcdf(new, engine="h5netcdf")
+    with writing(picture) as new:
+        figure.savefig(new, format="png")
 
 
 def _same(one: Path, other: Path) -> bool:

@@ -16,7 +16,7 @@ from rigidsim.errors import ConfigError, RigidsimError
 from rigidsim.look.signals import is_averaged
 from rigidsim.scene.arithmetic import norm
 from rigidsim.scene.scene import Scene, build_scene
-from rigidsim.store.outputs import refuse_loss, writing
+from rigidsim.store.outputs import refuse_loss
 from rigidsim.store.run import Run
 from rigidsim.workflows.compare.as_run import open_any
 from rigidsim.workflows.known_frequencies import OF_ROTATION, known_frequencies
@@ -127,14 +127,3 @@ def places_of(out: Path, inputs: Iterable[Path], *, force: bool = False) -> Save
     places = Saved(out, out.with_suffix(".png"))
     refuse_loss([places.dataset, places.figure], inputs, force=force)
     return places
-
-
-def save(analysis: Analysis, places: Saved) -> None:
-    """Write dataset and figure, each of which appears only when complete."""
-    from rigidsim.look.figures.spectrum import spectrum_figure
-
-    dataset = analysis.dataset
-    with writing(places.dataset) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf")
-    with writing(places.figure) as temporary:
-        spectrum_figure(dataset).savefig(temporary, format="png")

@@ -19,7 +19,7 @@ from rigidsim.accuracy.bench import ATTRIBUTES, DEFAULT, BestSetting, advice, me
 from rigidsim.errors import RigidsimError, RunFolderError
 from rigidsim.scene.choices import FULL
 from rigidsim.scene.config import Experiment
-from rigidsim.store.outputs import refuse_loss, writing
+from rigidsim.store.outputs import refuse_loss, write_drawn
 from rigidsim.workflows.compare.compared import Comparison, compare
 from rigidsim.workflows.plan import compared_levels
 from rigidsim.workflows.read import Given, as_experiment
@@ -134,7 +134,7 @@ def tradeoff(
     dataset = with_others(with_models(dataset, experiment), judged)
     result = Tradeoff(dataset, folder)
     if folder is not None:
-        save(dataset, folder)
+        write_drawn(dataset, folder / DATASET, result.plot(), folder / FIGURE)
     return result
 
 
@@ -190,13 +190,3 @@ def with_models(dataset: xarray.Dataset, experiment: Experiment) -> xarray.Datas
         model_error=("model", np.array(errors), {"units": "rad", "long_name": what}),
         model_cpu_ratio=("model", np.array(ratios), {"units": "1", "long_name": relative}),
     ).assign_coords(model=("model", np.array(levels, dtype=object), {"long_name": "averaged model"}))
-
-
-def save(dataset: xarray.Dataset, folder: Path) -> None:
-    """Write dataset and figure, each of which appears only when complete."""
-    from rigidsim.look.figures.work_precision import work_precision_figure
-
-    with writing(folder / DATASET) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf")
-    with writing(folder / FIGURE) as temporary:
-        work_precision_figure(dataset).savefig(temporary, format="png")

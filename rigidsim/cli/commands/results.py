@@ -14,7 +14,7 @@ from rigidsim.look.figure_names import OVERVIEW, SPECTRUM
 from rigidsim.look.figures import available, check_name, figure_format, save_figure
 from rigidsim.look.figures.sweeps import drawable, sweep_figure
 from rigidsim.store.folder import SweepFolder, folder_at
-from rigidsim.store.outputs import ANALYSIS, refuse_loss, writing
+from rigidsim.store.outputs import ANALYSIS, refuse_loss, write_drawn, writing
 from rigidsim.store.run import SavedRun, ShownRun
 from rigidsim.store.sweeps.saved import SavedSweep, open_saved, open_sweep
 from rigidsim.workflows.compare.as_run import open_any
@@ -32,7 +32,7 @@ def analyse(
     usual = opened.folder.analysis if isinstance(opened, SavedRun) else _in_folder_of(opened, ANALYSIS)
     places = analysing.places_of(out or usual, opened.files, force=force)
     analysis = analysing.analyse(opened, variable or (), lines=lines)
-    analysing.save(analysis, places)
+    write_drawn(analysis.dataset, places.dataset, analysis.figure(), places.figure)
     answer(as_json, analysis.as_dict(), print_analysis, analysis, places)
 
 
@@ -79,13 +79,9 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None, for_slides: s
         for name in wanted or [OVERVIEW]:
             own = "" if name == OVERVIEW else "_" + name.replace("[", "_").replace("]", "")
             own += "" if for_slides is None else "_slide"
-            usual = f"figure{own}.png"
-            if isinstance(saved, ShownRun):
-                usual = _in_folder_of(saved, usual).name
-                folder = saved.path.parent if out is None else out
-            else:
-                folder = saved.folder.path if out is None else out
-            target = folder / usual if several or out is None else out
+            file = f"figure{own}.png"
+            usual = _in_folder_of(saved, file) if isinstance(saved, ShownRun) else saved.folder.path / file
+            target = usual if out is None else out / usual.name if several else out
             try:
                 kind = figure_format(target)
                 refuse_loss([target], saved.files)
