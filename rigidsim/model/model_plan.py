@@ -204,16 +204,17 @@ def _check_recordable(scene: Scene, formulation: str, record: list[str] | None) 
     for name in record or ():
         for need in OBSERVABLES[name].needs if name in OBSERVABLES else ():
             why = NEEDS[need].missing(scene, formulation)
-            if why is not None:
-                raise ConfigError(Problem("[output] record", f'given "{name}": {why}'))
-    if not variables_named(formulation).keeps_attitude and scene.free_flight and record is None:
-        raise ConfigError(
+            ensure(why is None, ConfigError(Problem("[output] record", f'given "{name}": {why}')))
+    ensure(
+        variables_named(formulation).keeps_attitude or not scene.free_flight or record is not None,
+        ConfigError(
             Problem(
                 "[integrator] formulation",
                 f'given "{formulation}" for a scene with a position; name what to record in [output] '
                 'record, or choose "auto"',
             )
-        )
+        ),
+    )
 
 
 # --- loads that are refused ---------------------------------------------------------------------------------

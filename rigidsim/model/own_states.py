@@ -80,13 +80,15 @@ def refuse_taken_names(scene: Scene, blocks: Iterable[StateBlock]) -> None:
     """
     names = [name for block in blocks for name in block.names]
     for number, table in enumerate(scene.config.states, start=1):
-        if names.count(table.name) > 1:
-            raise ConfigError(
+        ensure(
+            names.count(table.name) <= 1,
+            ConfigError(
                 Problem(
                     f"[[states]] number {number} name",
                     f'given "{table.name}", which another state of the motion is called already; rename it',
                 )
-            )
+            ),
+        )
 
 
 def refuse_odd_states(scene: Scene) -> None:

@@ -756,13 +756,15 @@ def refuse_same_sources(loads: Iterable[Any], host: str | None) -> None:
         if name is None:
             continue
         where = f"[[loads]] number {number} source"
-        if (load.kind, name) in seen:
-            raise ConfigError(
+        ensure(
+            (load.kind, name) not in seen,
+            ConfigError(
                 Problem(
                     where,
                     f'given "{name}", as in another {load.kind}, by which it acts twice; remove one of them',
                 )
-            )
+            ),
+        )
         seen.add((load.kind, name))
         parts = [x for x in _PARTS if (load.kind, x) in seen or x == host]
         if (load.kind, _BOTH) in seen and parts:

@@ -18,7 +18,7 @@ from typing import Any
 import heyoka as hy
 
 import rigidsim.model.observables.mechanical  # noqa: F401  (enters what it defines into the registry)
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.model.euler_poles import Poles
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.mechanics import Mechanics
@@ -472,8 +472,10 @@ def build_system(plan: ModelPlan, number: Rounder) -> System:
         number(value)
     for variable in variables:
         for exponent in variable.exponents:
-            if abs(exponent) > _LARGEST_EXPONENT:
-                raise OverflowError(f"{variable.name} would be about 2^{exponent} {variable.units}")
+            ensure(
+                abs(exponent) <= _LARGEST_EXPONENT,
+                OverflowError(f"{variable.name} would be about 2^{exponent} {variable.units}"),
+            )
     return system
 
 
@@ -616,12 +618,14 @@ def projected_invariants(system: System) -> tuple[list[ProjectedScalar], list[tu
             ]
         else:
             projected += [ProjectedScalar(name, expression, scale) for expression in invariant.expressions]
-    if not projected:
-        raise ConfigError(
+    ensure(
+        projected,
+        ConfigError(
             Problem(
                 "[integrator] hold_invariants",
                 f"given true, but the loads leave nothing constant that {system.formulation.name} "
                 'carries; set it to false, or choose formulation = "quaternion", whose norm can be projected',
             )
-        )
+        ),
+    )
     return projected, left_out

@@ -181,10 +181,12 @@ def kept_resonance(
     ]
     kept = [resonance for resonance in found if resonance is not None]
     names = [f"number {resonance.source.number} ({resonance.name})" for resonance in kept]
-    if len(kept) > 1:
-        raise refused(
+    ensure(
+        len(kept) <= 1,
+        refused(
             scene.config.model.level, f"the body is in resonance with [[loads]] {' and '.join(names)} at once"
-        )
+        ),
+    )
     if kept and scene.config.model.short_period:
         refuse_short_period(f"in resonance with [[loads]] {names[0]} what goes round with that orbit")
     return kept[0] if kept else None

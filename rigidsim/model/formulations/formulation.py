@@ -42,7 +42,7 @@ from typing import Any, ClassVar, TypeVar
 
 import heyoka as hy
 
-from rigidsim.errors import ConfigError, Problem, required
+from rigidsim.errors import ConfigError, Problem, ensure, required
 from rigidsim.model import rotations
 from rigidsim.model.averaged.average import Average
 from rigidsim.model.kinematics import ConstantInertia, in_common_unit
@@ -634,8 +634,7 @@ class Planar(Formulation):
 
 def _plane_of(scene: Scene, loads: Sequence[Load]) -> tuple[Vector, Vector, Any]:
     """Axis, origin and angle of a motion that stays in a plane; ``Unsuited`` where that isn't known."""
-    if scene.free_flight:
-        raise Unsuited("the body has a position and flies")
+    ensure(not scene.free_flight, Unsuited("the body has a position and flies"))
     if beside := carried_beside(loads):
         raise Unsuited(beside)
     context = scene.context
@@ -663,8 +662,10 @@ def _spin_axis(scene: Scene, loads: Sequence[Load]) -> Vector:
     if size != 0:
         axis = [w / size for w in rates]
         momentum = apply(scene.body.inertia, axis)
-        if norm(context, cross(axis, momentum)) > tiny * max(scene.body.principal_moments):
-            raise Unsuited("the body doesn't turn about a principal axis")
+        ensure(
+            norm(context, cross(axis, momentum)) <= tiny * max(scene.body.principal_moments),
+            Unsuited("the body doesn't turn about a principal axis"),
+        )
         return axis
     for axis in scene.body.principal_axes[::-1]:
         if turned_out(scene, loads, axis) is None:

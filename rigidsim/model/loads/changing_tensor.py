@@ -471,13 +471,15 @@ def _raising(config: Config, names: list[str] | None) -> tuple[int, ...]:
         if name not in known:
             allowed = ", ".join(known) or f"none, since no {_RAISING} has a name"
             raise fault("raised_by", f'given "{name}"{nearest(name, known)}; allowed: {allowed}')
-        if kinds[known[name]] != _RAISING:
-            raise fault(
+        ensure(
+            kinds[known[name]] == _RAISING,
+            fault(
                 "raised_by",
                 f'given "{name}", a load of kind {kinds[known[name]]}; the source of a {_RAISING} '
                 "raises "
                 "tides: name that, or add one",
-            )
+            ),
+        )
     found = tuple(known[name] for name in names)
     ensure(
         len(set(found)) == len(found),
@@ -588,12 +590,14 @@ class Elasticity(Load, Carrier):
         found = [scene.given_loads[n].gradient_source for n in self.raising]
         sources = [source for source in found if source is not None]
         for source in sources:
-            if why := source.placement.untracked:
-                raise fault(
+            ensure(
+                not (why := source.placement.untracked),
+                fault(
                     "raised_by",
                     f"given a source whose velocity isn't known: {why}; give it an orbit by elements, "
                     "take it from a kernel, make it one of [[bodies]], or name others here",
-                )
+                ),
+            )
         return sources
 
     # --- the tensor -----------------------------------------------------------------------------------------

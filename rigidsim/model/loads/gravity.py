@@ -962,14 +962,16 @@ def _distant(fields: GravityGradientFields, strength: Any, around: Setting) -> P
         return PlacedOnOrbit(resolve_orbit(fields.elements, strength, around))
     if fields.ephemeris is not None:
         refuse_series(around)
-        if around.axes not in (None, ECLIPTIC):
-            raise ConfigError(
+        ensure(
+            around.axes in (None, ECLIPTIC),
+            ConfigError(
                 Problem(
                     "[frame] axes",
                     f'given "{around.axes}", but the ephemeris of [[loads]] number {around.number + 1} is '
                     f'in "{ECLIPTIC}"; write that, or leave axes out',
                 )
-            )
+            ),
+        )
         return PlacedBySeries(fields.ephemeris, around.epoch or J2000)
     position = [x.at(around.context) for x in fields.position or []]
     ensure(

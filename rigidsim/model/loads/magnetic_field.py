@@ -271,11 +271,13 @@ def field_of(fields: MagneticFieldFields, around: Setting) -> UniformField:
 def _on_orbit(fields: MagneticFieldFields, around: Setting) -> PlacedOnOrbit:
     elements, given = required(fields.elements), fields.gravitational_parameter
     for key in ("body", "table"):
-        if getattr(elements, key, None) is not None:
-            raise around.fault(
+        ensure(
+            getattr(elements, key, None) is None,
+            around.fault(
                 f"{elements.key}.{key}",
                 f"given for a {fields.kind}, which takes elements alone; gravity_gradient takes a " + key,
-            )
+            ),
+        )
     return PlacedOnOrbit(resolve_orbit(elements, None if given is None else given.at(around.context), around))
 
 

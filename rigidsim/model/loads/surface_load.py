@@ -206,10 +206,10 @@ def _known(scene: Scene) -> tuple[Any, Matrix]:
     except ValueError as error:
         raise _fault(scene, f"{given}at {epoch}, but {error}; give a later epoch") from None
     first, *others = _asking(scene.config)
-    if any(getattr(x, key) != getattr(first, key) for x in others for key in INDICES):
-        raise _fault(
-            scene, f"{given}by several loads with different {', '.join(INDICES)}; give them the same"
-        )
+    ensure(
+        not any(getattr(x, key) != getattr(first, key) for x in others for key in INDICES),
+        _fault(scene, f"{given}by several loads with different {', '.join(INDICES)}; give them the same"),
+    )
     source = required(flown_about(scene.config)).of(scene)
     strength = source.gravitational_parameter
     if strength is not None and not EARTH.attracts_by(strength):
