@@ -251,7 +251,7 @@ def jacobi_constant(m: Mechanics) -> Symbolic:
     pairs = zip(orbit.normal(context), m.momentum_space, strict=True)
     carried = [m.number(motion * o) * x for o, x in pairs if o != 0]
     potentials = [m.carried(load.potential(m)) for load in m.turning]
-    return m.kept_rotational_energy - hy.sum(carried) + reduce(add, potentials)
+    return m.rotational(kept=True) - hy.sum(carried) + reduce(add, potentials)
 
 
 # --- starts against the reference plane ---------------------------------------------------------------------

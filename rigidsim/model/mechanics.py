@@ -169,15 +169,12 @@ class Mechanics(Kinematics):
     @cached_property
     def rotational_energy(self) -> Symbolic:
         """Kinetic energy of rotation of the body, w . I w / 2, and of all carriers."""
-        return self._rotational(self.carriers)
+        return self.rotational()
 
-    @cached_property
-    def kept_rotational_energy(self) -> Symbolic:
-        """The same without carriers whose energy changes by what their drives do alone."""
-        return self._rotational([x for x in self.carriers if not x.lends(self)])
-
-    def _rotational(self, carriers: list[Any]) -> Symbolic:
+    def rotational(self, *, kept: bool = False) -> Symbolic:
+        """The same; if ``kept``, without carriers whose energy changes by what their drives do alone."""
         own = self.inertia.energy(self.undistorted_rates, self.own_momentum)
+        carriers = (x for x in self.carriers if not (kept and x.lends(self)))
         others = [found for x in carriers if (found := x.carried_energy(self)) is not None]
         return hy.sum([own, *others]) if others else own
 
@@ -334,24 +331,18 @@ class Mechanics(Kinematics):
     @cached_property
     def energy(self) -> Symbolic:
         """Kinetic energy (rotation, and translation if the centre of mass moves) plus potential energy."""
-        return self._with_rotational(self.rotational_energy, self.potential_energy)
+        return self.total_energy()
 
-    @cached_property
-    def kept_energy(self) -> Symbolic:
-        """The same with ``kept_rotational_energy``."""
-        potential = self.potential_energy if self._rigid is None else self._rigid.potential_energy
-        return self._with_rotational(self.kept_rotational_energy, potential)
-
-    def _with_rotational(self, rotational: Symbolic, potential: Symbolic | None) -> Symbolic:
-        terms = [rotational]
-        mass = self.scene.body.mass
+    def total_energy(self, *, kept: bool = False) -> Symbolic:
+        """The same, perhaps as ``rotational`` is kept."""
+        terms = [self.rotational(kept=True) if kept else self.rotational_energy]
+        mass, scaling = self.scene.body.mass, self.scaling
         if self.velocity is not None and mass is not None:
-            context, scaling = self.scene.context, self.scaling
-            half_mass = context.ldexp(mass / 2, 2 * scaling.speed - scaling.energy)
-            terms.append(self.number(half_mass) * hy.sum([v * v for v in self.velocity]))
-        if potential is not None:
-            terms.append(potential)
-        return hy.sum(terms)
+            half_mass = self.scaled(mass / 2, 2 * scaling.speed - scaling.energy)
+            terms.append(half_mass * hy.sum([v * v for v in self.velocity]))
+        rigid = self._rigid if kept else None
+        potential = self.potential_energy if rigid is None else rigid.potential_energy
+        return hy.sum([*terms, *([] if potential is None else [potential])])
 
     @property
     def preferred_axis(self) -> Vector | None:

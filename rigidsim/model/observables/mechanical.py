@@ -117,7 +117,7 @@ def rotational_scale(m: Mechanics, *, kept: bool = False) -> tuple[Any, str]:
 
 
 def kept_energy_scale(m: Mechanics) -> tuple[Any, str]:
-    """The same for ``Mechanics.kept_energy``."""
+    """The same for ``Mechanics.total_energy`` that is kept."""
     return energy_scale(m, kept=True)
 
 
@@ -259,7 +259,7 @@ def _euler_poles(m: Mechanics) -> Poles | None:
 
 def _energy_balance(m: Mechanics) -> list[Symbolic]:
     unit = m.scene.context.ldexp(m.scene.context.one, m.work_unit - m.scaling.energy)
-    return [m.kept_energy - m.number(unit) * hy.make_vars(WORK)]
+    return [m.total_energy(kept=True) - m.number(unit) * hy.make_vars(WORK)]
 
 
 def _work(m: Mechanics) -> list[Symbolic]:
@@ -438,7 +438,7 @@ PARTS = (
     ),
     Observable(
         "body_energy", (), "J", "energy of the body with the rotors at fixed rates locked",
-        lambda m: [m.kept_energy], same_unit(ENERGY, 1), "", ("energy", "fixed_rotors"),
+        lambda m: [m.total_energy(kept=True)], same_unit(ENERGY, 1), "", ("energy", "fixed_rotors"),
         _kept, kept_energy_scale,
     ),
     Observable(
