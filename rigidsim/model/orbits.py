@@ -69,12 +69,11 @@ from typing import Any, Protocol
 import heyoka as hy
 import numpy as np
 
-from rigidsim.errors import required
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder, Scaling
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor, rounded
-from rigidsim.scene.arithmetic import Vector, bits_in_use, cosine_and_sine, cross, norm
+from rigidsim.scene.arithmetic import bits_in_use, cosine_and_sine
 from rigidsim.scene.kepler import regular_place
 from rigidsim.scene.kernels.ephemeris import Ephemeris
 from rigidsim.scene.kernels.reading import RelativeEphemeris
@@ -659,76 +658,6 @@ class PointMassStates:
         if pulls:
             why += ", and gravity of the body's shape"
         return StateBlock(names, derivatives, initial, exponents=exponents, why=why)
-
-
-# --- a pair left to itself ----------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class PointMassPair:
-    """A point mass as seen from the one that the body is."""
-
-    masses: PointMasses  # one of them is the body's host
-    number: int
-
-    @property
-    def name(self) -> str:
-        """Name of the point mass."""
-        return self.masses.names[self.number]
-
-    @property
-    def host(self) -> int:
-        """Index of the one that the body is."""
-        return required(self.masses.host)
-
-    @property
-    def place(self) -> Vector:
-        """Vector from the body to the point mass at the start, m (mpf)."""
-        here, there = self.masses.positions[self.host], self.masses.positions[self.number]
-        return [a - b for a, b in zip(there, here, strict=True)]
-
-    @property
-    def _moving(self) -> Vector:
-        here, there = self.masses.velocities[self.host], self.masses.velocities[self.number]
-        return [a - b for a, b in zip(there, here, strict=True)]
-
-    @property
-    def _attraction(self) -> Any:
-        """Sum of both gravitational parameters, m^3/s^2."""
-        return self.masses.strengths[self.host] + self.masses.strengths[self.number]
-
-    def ellipse(self, context: Any) -> tuple[Any, float, float] | None:
-        """Semi-major axis (m, mpf), eccentricity and mean motion (rad/s) of a bound pair, or None."""
-        speed = norm(context, self._moving)
-        inverse = 2 / norm(context, self.place) - speed * speed / self._attraction
-        if not inverse > 0:
-            return None
-        axis, momentum = 1 / inverse, norm(context, cross(self.place, self._moving))
-        squared = 1 - momentum * momentum / (self._attraction * axis)
-        e = float(context.sqrt(squared)) if squared > 0 else 0.0
-        return axis, e, float(context.sqrt(self._attraction / axis) / axis)
-
-    def encounter(self, context: Any) -> tuple[Any, Any]:
-        """Least distance (m) and the angular rate there (rad/s), mpf."""
-        return self.masses.encounter(context, self.host, self.number)
-
-    def perturbation(self, context: Any) -> float:
-        """Sum of the sizes of what other masses change the relative motion by, over the mutual attraction."""
-        distance, total = norm(context, self.place), 0.0
-        for other, strength in enumerate(self.masses.strengths):
-            if other in (self.host, self.number):
-                continue
-            pulls = [self._pull(context, mass, other) for mass in (self.host, self.number)]
-            tide = [a - b for a, b in zip(*pulls, strict=True)]
-            total += float(strength * norm(context, tide) * distance**2 / self._attraction)
-        return total
-
-    def _pull(self, context: Any, mass: int, other: int) -> Vector:
-        """Acceleration of one mass by another one of unit strength, 1/m^2."""
-        ends = self.masses.positions[mass], self.masses.positions[other]
-        towards = [b - a for a, b in zip(*ends, strict=True)]
-        cubed = norm(context, towards) ** 3
-        return [x / cubed for x in towards]
 
 
 _RATES = ("", "v", "a", "j")

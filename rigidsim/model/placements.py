@@ -28,9 +28,9 @@ from typing import Any, ClassVar
 import heyoka as hy
 import numpy as np
 
-from rigidsim.errors import ConfigError, Problem, ensure
+from rigidsim.errors import ConfigError, Problem, ensure, required
 from rigidsim.model.kinematics import Kinematics, seconds
-from rigidsim.model.orbits import KeplerParts, PointMassPair, Pull
+from rigidsim.model.orbits import KeplerParts, Pull
 from rigidsim.model.rotations import Symbolic, constant, length, unit
 from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.epochs import Epoch
@@ -39,7 +39,7 @@ from rigidsim.scene.kernels.ephemeris import Ephemeris
 from rigidsim.scene.kernels.reading import RelativeEphemeris
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
-from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, PointMasses, closest
+from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, PointMasses, closest, kepler_reach
 from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.space_axes import ECLIPTIC
@@ -551,60 +551,75 @@ class PlacedAsMass(AmongMasses):
     moves: ClassVar[bool] = True
 
     @property
-    def pair(self) -> PointMassPair:
-        """It, and the one that the body is."""
-        return PointMassPair(self.masses, self.number)
+    def host(self) -> int:
+        """Index of the one that the body is."""
+        return required(self.masses.host)
+
+    @property
+    def _attraction(self) -> Any:
+        """Sum of both gravitational parameters, m^3/s^2 (mpf)."""
+        return self.masses.strengths[self.host] + self.masses.strengths[self.number]
+
+    def _relative(self, context: Any) -> tuple[Vector, Vector, Vector]:
+        """Place, velocity and acceleration at the start, as seen from the body (mpf, SI)."""
+        return self.masses.relative(self.host, self.number, context)
+
+    def _ellipse(self, context: Any) -> tuple[Any, float] | None:
+        """Semi-major axis (m, mpf) and eccentricity of one that is bound; None of others."""
+        least, most = kepler_reach(context, *self._relative(context)[:2], self._attraction)
+        return None if most is None else ((least + most) / 2, float((most - least) / (most + least)))
 
     def distance(self, context: Any) -> Any:
         """Semi-major axis at the start, or the least distance of one that isn't bound."""
-        ellipse = self.pair.ellipse(context)
-        return self.pair.encounter(context)[0] if ellipse is None else ellipse[0]
+        ellipse = self._ellipse(context)
+        return self.masses.encounter(context, self.host, self.number)[0] if ellipse is None else ellipse[0]
 
     def encounter(self, scene: Setting) -> tuple[Any, Any]:
-        return self.pair.encounter(scene.context)
+        return self.masses.encounter(scene.context, self.host, self.number)
 
     def away(self, m: Kinematics) -> list[Symbolic]:
-        return m.carried(m.point_masses).between(self.number, self.pair.host)
+        return m.carried(m.point_masses).between(self.number, self.host)
 
     def seen(self, m: Kinematics) -> SourcePlace:
-        states, host = m.carried(m.point_masses), self.pair.host
+        states, host = m.carried(m.point_masses), self.host
         inverse = states.inverse_distances[min(host, self.number), max(host, self.number)]
         context = m.scene.context
         line = [x * inverse for x in states.between(host, self.number)]
         return SourcePlace(line, inverse, context.ldexp(context.one, m.scaling.length))
 
     def at_start(self, scene: Setting) -> Vector:
-        return self.pair.place
+        return self._relative(scene.context)[0]
 
     def motion(self, m: Kinematics) -> SourceMotion:
         """Under the mutual gravity of all as points."""
-        found, place = m.carried(m.point_masses).relative(self.pair.host, self.number), self.seen(m)
+        found, place = m.carried(m.point_masses).relative(self.host, self.number), self.seen(m)
         return SourceMotion(*found, place.inverse, place.unit)
 
     def motion_at_start(self, scene: Scene) -> tuple[Vector, Vector, Vector]:
-        return self.masses.relative(self.pair.host, self.number, scene.context)
+        return self._relative(scene.context)
 
     def velocity(self, m: Kinematics) -> list[Symbolic]:
         velocities = m.carried(m.point_masses).velocities
-        return [a - b for a, b in zip(velocities[self.pair.host], velocities[self.number], strict=True)]
+        return [a - b for a, b in zip(velocities[self.host], velocities[self.number], strict=True)]
 
     def velocity_at_start(self, scene: Setting) -> Vector:
-        velocities = self.masses.velocities
-        return [a - b for a, b in zip(velocities[self.pair.host], velocities[self.number], strict=True)]
+        return [-v for v in self._relative(scene.context)[1]]
 
     def reaction(self, m: Kinematics, pull: list[Symbolic], sign: int) -> list[Pull]:
-        one, ratio = (
-            m.scene.context.one,
-            self.masses.strengths[self.pair.host] / self.masses.strengths[self.number],
-        )
-        return [(self.pair.host, sign * one, pull), (self.number, -sign * ratio, pull)]
+        one = m.scene.context.one
+        ratio = self.masses.strengths[self.host] / self.masses.strengths[self.number]
+        return [(self.host, sign * one, pull), (self.number, -sign * ratio, pull)]
 
     def circuit(self, context: Any) -> Circuit:
-        least, rate = self.pair.encounter(context)
-        if (ellipse := self.pair.ellipse(context)) is None:
+        least, rate = self.masses.encounter(context, self.host, self.number)
+        if (ellipse := self._ellipse(context)) is None:
             return Circuit(passing_rate=float(rate))
+        (axis, e), (place, _, drawn) = ellipse, self._relative(context)
         # what the others do to axis and eccentricity is of the size of their share in the acceleration
-        perturbed, (axis, e, motion) = self.pair.perturbation(context), ellipse
+        mutual = self._attraction / norm(context, place) ** 3
+        others = [a + mutual * x for a, x in zip(drawn, place, strict=True)]
+        perturbed = float(norm(context, others) / (mutual * norm(context, place)))
+        motion = float(context.sqrt(self._attraction / axis) / axis)
         closer = float(least / axis) * max(1 - 2 * perturbed, 0.5)
         e = min(e + 2 * perturbed, _ALMOST_PARABOLIC)
         doubt = perturbed * motion
