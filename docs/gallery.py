@@ -3,8 +3,9 @@
 ``python -m docs.gallery [NAME...]`` runs the configs, draws the figure of ``rigidsim plot`` for all, or for
 the named ones, into docs/figures/gallery, and writes the table of docs/gallery.md. ``--timelines`` draws
 timelines instead, as ``rigidsim view --png`` does; the rerun viewer needs a renderer for it (a software one
-suffices). ``--table`` only prints the table, which a test compares with the page. The site adds a section for
-each config (``docs/builder/sections.py``).
+suffices). ``--films`` draws four seconds of the scenes that the site plays, into docs/figures/films.
+``--table`` only prints the table, which a test compares with the page. The site adds a section for each
+config (``docs/builder/sections.py``).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import rigidsim
+from docs.builder import scenes
 from docs.builder.sections import CONFIGS, ROOT
 
 PAGE = ROOT / "docs" / "gallery.md"
@@ -23,6 +25,8 @@ PICTURES = ROOT / "docs" / "figures" / "gallery"
 _DOTS_PER_INCH = 100
 _COLOURS = 256  # of a picture's palette
 _TIMELINE_WIDTH = 1200
+FILMS = ROOT / "docs" / "figures" / "films"
+_FILM_SECONDS, _FILM_WIDTH, _FILM_COLOURS = 4.0, 480, 64  # some 100 to 400 kB
 _COLUMNS = (
     "config",
     "steps",
@@ -80,6 +84,31 @@ def timeline(run: rigidsim.Run, folder: Path, name: str) -> None:
     _save(drawn.resize(size, Image.Resampling.LANCZOS), f"{name}_timeline.png")
 
 
+def film(run: rigidsim.Run, folder: Path, name: str) -> None:
+    """A run's scene as a small film.
+
+    Args:
+        folder: for the film at its full size.
+    """
+    from PIL import Image, ImageSequence
+
+    from rigidsim.workflows.view import render
+
+    whole = folder / f"{name}.gif"
+    render([(name, run)], whole, seconds=_FILM_SECONDS, part="scene")
+    drawn = Image.open(whole)
+    size = _FILM_WIDTH, round(drawn.height * _FILM_WIDTH / drawn.width)
+    small = [
+        one.convert("RGB").resize(size, Image.Resampling.LANCZOS) for one in ImageSequence.Iterator(drawn)
+    ]
+    # rare colours, as of arrows, keep a place
+    palette = small[len(small) // 2].quantize(_FILM_COLOURS, method=Image.Quantize.MAXCOVERAGE, kmeans=8)
+    first, *rest = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in small]
+    FILMS.mkdir(parents=True, exist_ok=True)
+    options = {"save_all": True, "append_images": rest, "duration": drawn.info["duration"], "loop": 0}
+    first.save(FILMS / f"{name}.gif", optimize=True, **options)
+
+
 def _save(drawn: Any, file: str) -> None:
     from PIL import Image
 
@@ -91,22 +120,26 @@ def _save(drawn: Any, file: str) -> None:
 
 def main(given: list[str]) -> None:
     """Run, draw and write; or only print the table."""
-    alone, timelines = "--table" in given, "--timelines" in given
+    alone, timelines, films = (f"--{what}" in given for what in ("table", "timelines", "films"))
     named = {name for name in given if not name.startswith("-")}
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for config in CONFIGS:
             print(config.stem, file=sys.stderr, flush=True)
-            wanted = not named or config.stem in named
+            wanted = config.stem in (named or (scenes.PLAYED if films else {config.stem}))
+            if films and not wanted:
+                continue
             run = rigidsim.run(config, out=folder, changes={"output.timeline": timelines and wanted})
             rows.append(numbers(run, config))
-            if timelines and wanted:
+            if films:
+                film(run, Path(folder), config.stem)
+            elif timelines and wanted:
                 timeline(run, Path(folder), config.stem)
             elif not alone and wanted:
                 picture(run, config.stem)
     if alone:
         print(table(rows))
-    else:
+    elif not films:
         text = PAGE.read_text(encoding="utf-8")
         lines = [line for line in text.splitlines() if line.startswith("|")]
         PAGE.write_text(text.replace("\n".join(lines), table(rows)), encoding="utf-8")

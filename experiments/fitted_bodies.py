@@ -106,7 +106,7 @@ def toutatis() -> tuple[list[Check], Panel]:
     used = found.dataset["used_2"].values.astype(bool)
     rates = np.rad2deg(np.abs(found.dataset["residual_2"].values).max(axis=1)) * 86400
     times = found.dataset["time_2"].values / 86400
-    panel = Panel("Toutatis 1992: what is left", "days since 9 November 1992", "deg", [
+    panel = Panel("Toutatis 1992: residuals", "days since 9 November 1992", "deg", [
         Curve(found.dataset["time_1"] / 86400, residuals, "attitudes", "blue", "o-"),
         Curve(times[used], rates[used], "rates, deg/day", "orange", "s"),
         Curve(times[~used], rates[~used], "left out", "red", "x", 2),
@@ -252,7 +252,7 @@ def moon(folder: Path) -> tuple[list[Check], Panel]:
         true, seen = ((x[i] - x[j]) / x[k] for x in (moments, fitted))
         allowed = 3 * float(np.hypot(*spread)) / moments[k]
         checks.append(Check(f"Moon: {name}", seen, true, allowed, "1", source, "absolute"))
-    return checks, Panel("DE421's Moon, fitted: what is left", "years since 1969", "mas", curves)
+    return checks, Panel("DE421's Moon, fitted: residuals", "years since 1969", "mas", curves)
 
 
 @Study

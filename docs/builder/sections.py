@@ -17,8 +17,12 @@ _STUDIED = ("apophis_flyby", "flip_sphere", "round_off")  # sweeps with a pictur
 
 
 def with_sections(text: str) -> str:
-    """A page with a section for each scene or body, in place of its marker."""
-    scenes = [f"## {config.stem}\n\n{_scene(config)}" for config in CONFIGS]
+    """A page with a section for each scene or body, in place of its marker; above the scenes small pictures
+    that lead to them.
+    """
+    small = [f"[![{one.stem}](figures/gallery/{one.stem}_timeline.png)](#{one.stem})" for one in CONFIGS]
+    scenes = ["```{{container}} thumbnails\n{}\n```".format("\n".join(small))]
+    scenes += [f"## {config.stem}\n\n{_scene(config)}" for config in CONFIGS]
     scenes += ["## Sweeps", *map(_sweep, sorted((ROOT / "configs" / "sweeps").glob("*.toml")))]
     bodies = [f"## {body.stem}\n\n{_body(body)}" for body in BODIES]
     text = text.replace("<!-- a section for each scene -->", "\n\n".join(scenes))
@@ -36,10 +40,12 @@ def _scene(config: Path) -> str:
     look = _comment(config)
     look = look.partition("What to look for: ")[2] or look
     drawn = f"figures/gallery/{config.stem}"
+    film = f"figures/films/{config.stem}.gif"
     return "\n\n".join(
         [
             _title(config),
             look[:1].upper() + look[1:],
+            *([f"![Four seconds of it]({film})"] if (ROOT / "docs" / film).exists() else []),
             f"![Its timeline]({drawn}_timeline.png)",
             f"![Figure drawn by rigidsim plot]({drawn}.png)",
         ]

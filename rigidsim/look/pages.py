@@ -209,7 +209,7 @@ def _from_to(rows: xarray.Dataset, words: str, plot: Plot | None) -> Iterator[tu
         ends, every = (min(values), max(values)), ""
         passes = _passes(signals.seconds(rows)[np.isfinite(column)], values - sum(ends) / 2)
         swings = np.diff(passes[::2])
-        if len(passes) == 1:
+        if plot.log or len(passes) == 1:
             ends = values[0], values[-1]
         elif len(swings) > 1 and np.std(swings) < _REGULAR * np.mean(swings):
             every = f", every {period_text(float(swings.mean()), rows.attrs, 4)}"

@@ -115,7 +115,7 @@ class Run(Result):
 
         Args:
             png: file of the picture.
-            at: its moment, in the scene's unit of time or with a unit (``"2.4 hr"``); else 40 % of the run.
+            at: its moment, in the scene's unit of time or with a unit (``"2.4 hr"``); else near 40 % of it.
             part: what it shows: "page", "scene" or "plots".
 
         Returns:
