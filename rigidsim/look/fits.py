@@ -49,10 +49,12 @@ class SecularLine:
 
 
 def turn_text(mean: SecularLine, attributes: Mapping[str, Any]) -> str:
-    """The time that a mean motion needs for a turn, to at most five digits, as many as its error leaves."""
-    sure = abs(mean.rate) / max(mean.error, 1e-9 * abs(mean.rate))
-    digits = int(np.clip(math.log10(max(sure, 1.0)), 2, 5))
-    return mean.about + period_text(_TURN / abs(mean.rate), attributes, digits)
+    """The time that a mean motion needs for a turn, to at most five digits, as many as its error leaves;
+    "about" so long if these are fewer than three.
+    """
+    digits = math.log10(abs(mean.rate) / max(mean.error, 1e-9 * abs(mean.rate)))
+    about = "about " if digits < 3 or not mean.known else ""
+    return about + period_text(_TURN / abs(mean.rate), attributes, int(np.clip(digits, 3, 5)))
 
 
 def secular(time: Array, angle: Array) -> SecularLine:

@@ -2,13 +2,18 @@
 
 import re
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
+from support import CONFIGS, cases
 
 import rigidsim
 from rigidsim.look.figures import figure
+from rigidsim.look.figures.catalogue import Shown
+from rigidsim.look.pages import numbers, summary_page
 from rigidsim.look.stages.registry import build_picture
+from rigidsim.look.thinning import thin
 from rigidsim.scene.readable import YEAR
 
 Ready = Callable[..., rigidsim.SavedRun]
@@ -25,6 +30,35 @@ def texts(dataset: object, what: str) -> str:
         found += [text.get_text() for text in legend.get_texts()] if legend else []
         found += [text.get_text() for text in axes.texts]
     return "\n".join(found)
+
+
+FOLDERS = [CONFIGS[0].parent / one for one in ("", "bodies", "tables")]
+SCENES = [path for folder in FOLDERS for path in sorted(folder.glob("*.toml"))]
+USUAL = [path for path in SCENES if path.stem in ("heavy_top_nutating", "earth_free_nutation")]
+ONCE = re.compile(r"once\s+(?:round\s+)?in ((?:about )?[\d.]+ \w+)")
+RATES = {"precession": "precession_angle", "figure axis precesses in": "node_longitude.figure"}
+TURN = 2 * np.pi
+
+
+@pytest.mark.parametrize("path", cases(SCENES, USUAL, daily=4), ids=[path.stem for path in SCENES])
+def test_figures_timelines_and_analyse_say_the_same_digits(path: Path, ready: Ready) -> None:
+    dataset = ready(path).dataset
+    said = dict(numbers(Shown.of(dataset).rows))
+    rows = thin(dataset, 100_000).assign_attrs(dataset.attrs)
+    summary = summary_page(dataset, rows)
+    assert all(words in summary and text in summary for words, text in said.items()), (said, summary)
+    stage = " ".join(part.words for one in build_picture(rows)[0].stages for part in one.parts)
+    for found in ONCE.findall(texts(dataset, "overview")) + ONCE.findall(stage):
+        assert found in said.values(), (found, said)
+    for words, signal in RATES.items():
+        name = signal.split(".")[0]
+        if "about" in said.get(words, "about") or not np.isfinite(dataset.get(name, np.nan)).all():
+            continue  # few digits, or a top that goes through its vertical
+        rate = abs(float(rigidsim.analyse(dataset, [signal])[signal].rate.real))
+        number, unit = said[words].split()
+        known = rate / TURN * _UNITS[unit.removeprefix("turns/")]
+        digits = len(number.replace(".", "").lstrip("0"))
+        assert number == f"{known if '/' in unit else 1 / known:.{digits}g}"
 
 
 def period(text: str) -> float:
