@@ -51,7 +51,7 @@ _CYCLES = 14  # swings shown of the start, where there are many
 _NAME = 30  # letters that a name in the table has room for
 _CURVE, _PLANE, _FACT = 2.55, 4.7, 0.235  # heights, inches
 _WIDE, _NARROW = 12.4, 8.2
-_PLANES_WIDE = 5.2  # width of a plane where only planes stand side by side
+_ROW = 5.2  # width and height of planes that stand side by side, inches
 
 
 Panel = Plot | PlanePath | Callable[[Axes], None]
@@ -233,7 +233,7 @@ class Shown:
         for column in () if begun is None else begun.values.T:
             values = column[np.isfinite(column)]
             if len(values) >= 50 and moves(values):
-                changes = int(np.count_nonzero(np.diff(np.signbit(values - values.mean()))))
+                changes = _crossings(values)
                 if changes < _TELLING * len(values):  # else too sparse to separate swings from a pattern
                     most = max(most, changes)
                 away = np.abs(values - np.median(values)) > _SETTLED * np.ptp(values)
@@ -263,13 +263,29 @@ def compose(
     """
     rows, table = shown.rows, numbers(shown.rows) if facts else []
     left, right = found_of(CURVES, curves, rows), found_of(PLANES, planes, rows)
+    row, both = bool(right and not left and not table), bool(left and (right or table))
+    below = _FACT * (len(table) + 1) if table else 0.0
+    lines = _CURVE * len(left) if len(left) > 1 else 3.6 * len(left)
+    height = _ROW if row else max(lines, _PLANE * len(right) + below, 2.6)
+    width = max(_ROW * len(right), 6.4) if row else _WIDE if both else _NARROW
     with rc_context(STYLE):  # type: ignore[arg-type]
-        if right and not left and not table:
-            figure = blank(rows, max(_PLANES_WIDE * len(right), 6.4), 5.2)
-            for axes, (_, panel) in zip(figure.subplots(1, len(right), squeeze=False)[0], right, strict=True):
-                draw(axes, rows, panel)
-        else:
-            figure = _two_columns(shown, left, right, table)
+        figure = blank(rows, width, height)
+        outer = figure.add_gridspec(1, 1 + both, width_ratios=[1.38, 1.0] if both else None)
+        grid = outer[0].subgridspec(max(len(left), 1), 1)
+        for k, (name, panel) in enumerate(left):
+            assert isinstance(panel, Plot)
+            _curve_panel(figure, grid[k], name, panel, shown, lowest=k == len(left) - 1)
+        spare = max(height - _PLANE * len(right) - below, 1e-3)
+        heights = [_PLANE] * len(right) + [below or 1e-3, spare]
+        grid = (
+            outer[-1].subgridspec(1, len(right))
+            if row
+            else outer[-1].subgridspec(len(heights), 1, height_ratios=heights)
+        )
+        for k, (_, panel) in enumerate(right):
+            draw(figure.add_subplot(grid[k]), rows, panel)
+        if table:
+            _table(figure.add_subplot(grid[len(right)]), table)
         figure.draw_without_rendering()  # the layout finds its sizes in this round and in drawing
     return figure
 
@@ -277,29 +293,6 @@ def compose(
 def found_of(panels: Finders, names: Sequence[str], rows: xarray.Dataset) -> _Found:
     """Names of those panels that a dataset has something for, with that."""
     return [(name, found) for name in names if (found := panels[name](rows)) is not None]
-
-
-def _two_columns(shown: Shown, curves: _Found, planes: _Found, table: list[tuple[str, str]]) -> Figure:
-    below = _FACT * (len(table) + 1) if table else 0.0
-    left = _CURVE * len(curves) if len(curves) > 1 else 3.6 * len(curves)
-    height = max(left, _PLANE * len(planes) + below, 2.6)
-    both = bool(curves and (planes or table))
-    figure = blank(shown.rows, _WIDE if both else _NARROW, height)
-    outer = figure.add_gridspec(1, 1 + both, width_ratios=[1.38, 1.0] if both else None)
-    grid = outer[0].subgridspec(max(len(curves), 1), 1)
-    for k, (name, panel) in enumerate(curves):
-        assert isinstance(panel, Plot)
-        _curve_panel(figure, grid[k], name, panel, shown, lowest=k == len(curves) - 1)
-    if planes or table:
-        spare = max(height - _PLANE * len(planes) - below, 1e-3)
-        grid = outer[-1].subgridspec(
-            len(planes) + 2, 1, height_ratios=[_PLANE] * len(planes) + [below or 1e-3, spare]
-        )
-        for row, (_, panel) in enumerate(planes):
-            draw(figure.add_subplot(grid[row]), shown.rows, panel)
-        if table:
-            _table(figure.add_subplot(grid[len(planes)]), table)
-    return figure
 
 
 def _curve_panel(
