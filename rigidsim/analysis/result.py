@@ -282,8 +282,8 @@ def _dataset(analysis: Analysis) -> xarray.Dataset:
         put(name, rows, kind, {"units": units, "long_name": words})
     for part in range(1, 1 if all(s.bits <= 53 for s in signals) else 3):
         rows = [[_remainder(line.frequency, part) for line in s.lines] for s in signals]
-        words = {"units": "rad s-1", "long_name": "angular frequency", "residual_of": "frequency"}
-        put(part_name("frequency", part), rows, _NUMBER, words)
+        attrs = {"units": "rad s-1", "long_name": "angular frequency", "residual_of": "frequency"}
+        put(part_name("frequency", part), rows, _NUMBER, attrs)
     for name, path, units, words, dtype in _OF_SIGNALS:
         values = np.array([_attribute(s, path) for s in signals], dtype=dtype)
         data[name] = (("signal",), values, {"units": units, "long_name": words})

@@ -156,7 +156,7 @@ class Signal:
                 f"{self.name}: not all samples are finite; analyse needs a part without gaps, for instance "
                 "dataset.isel(time=slice(0, 1000))"
             )
-        parts = tuple((real, *imaginary) if imaginary else (real, 0.0 * real) for real, *imaginary in columns)
+        parts = tuple((found[0], found[1] if len(found) > 1 else 0.0 * found[0]) for found in columns)
         return SignalSamples(parts, self.real, bits_of(self.dataset, len(parts)), clock.context, clock.late)
 
     @property

@@ -95,7 +95,7 @@ def _running(
             "to a browser on this machine (on another one through a tunnel: ssh -L 9090:127.0.0.1:9090 "
             "-L 9876:127.0.0.1:9876 HOST), and --png, --gif or --mp4 FILE draw without one"
         )
-    command, quiet = [*recording, *windowed], {}
+    command, quiet = [*recording, *windowed], dict[str, Any]()
     if web:  # only errors are reported
         command = [*recording, "--serve-web", "--port", str(port), "--web-viewer-port", str(WEB_PORT)]
         quiet = {"RUST_LOG": os.environ.get("RUST_LOG", "warn")}

@@ -68,8 +68,7 @@ class Subject:
         """A stage with the body, at the origin or on its track (rows, 3), to scale or with a reach of `size`
         in a unit of so many metres, and other parts; the rest is as of ``parts.Stage``.
         """
-        turning = None if self.quaternion is None else parts.viewer_quaternion(self.quaternion)
-        placed = parts.frame(BODY, translation=track, quaternion=turning)
+        placed = parts.frame(BODY, translation=track, quaternion=self.quaternion)
         if track is not None and any(part.path.startswith(CENTRE) for part in shown):
             placed += parts.frame(CENTRE, translation=track)
         drawn = parts.body([mesh.scaled(size) for mesh in self.meshes], size * self.points, axes)

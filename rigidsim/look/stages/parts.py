@@ -141,19 +141,23 @@ def around(place: str, name: str) -> str:
     return f"{place}/around/{name}".lstrip("/")
 
 
-def moving(kind: Any, **arrays: Array) -> Callable[[Rows], Columns]:
+def moving(kind: Any, **arrays: Any) -> Callable[[Rows], Columns]:
     """Columns of an archetype whose components are the rows of arrays."""
     return lambda rows: kind.columns(**{key: value[rows] for key, value in arrays.items()})
 
 
-def frame(name: str, **turning: Array | None) -> list[Part]:
-    """A frame, the body or its reference point, by the `quaternion` (rows, 4), x y z w, `translation` and
-    `scale` (rows, 3) that aren't None.
+def frame(name: str, *, quaternion: Array | None = None, **placed: Array | None) -> list[Part]:
+    """A frame, the body or its reference point, by quaternions (rows, 4) w x y z of any norm, and its
+    `translation` and `scale` (rows, 3), as far as they aren't None.
     """
     # in one call: apart, the viewer would see states that never were
-    given = {key: value.astype(np.float32) for key, value in turning.items() if value is not None}
-    shown = moving(rr.Transform3D, **given)
-    return [Part(name, (), shown, next(iter(given.values())))] if given else []
+    given = {key: value.astype(np.float32) for key, value in placed.items() if value is not None}
+    if quaternion is not None:
+        # x y z w, normalised in float64 first: the viewer takes the float32 numbers as they are
+        unit = (quaternion / norms(quaternion)[:, None])[:, [1, 2, 3, 0]]
+        given["quaternion"] = np.ascontiguousarray(unit, dtype=np.float32)
+    last = next(reversed(given.values()), np.empty(0))
+    return [Part(name, (), moving(rr.Transform3D, **given), np.asarray(last, float))] if given else []
 
 
 def arrow(
@@ -314,13 +318,6 @@ def longest(vectors: Array) -> float:
     """The largest norm of vectors (rows, 3); 0 if none is finite."""
     found = norms(vectors)
     return float(found[np.isfinite(found)].max(initial=0.0))
-
-
-def viewer_quaternion(quaternion: Array) -> NDArray[np.float32]:
-    """Quaternions (rows, 4) w x y z of any norm in the viewer's form: x y z w, unit, float32."""
-    # Normalised in float64 first: the viewer takes the float32 numbers as they are.
-    unit = quaternion / norms(quaternion)[:, None]
-    return np.ascontiguousarray(unit[:, [1, 2, 3, 0]], dtype=np.float32)
 
 
 def circle(radius: float, normal: Array, center: Array | None = None) -> Array:

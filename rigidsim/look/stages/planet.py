@@ -251,7 +251,7 @@ def reference_plane(dataset: xarray.Dataset) -> tuple[list[Part], str]:
     axes, words = signals.reference_axes(dataset) or (np.eye(3), "plane of reference")
     place, turning = "", []
     if not np.array_equal(axes, np.eye(3)):
-        place, turn = PLANE, parts.viewer_quaternion(quaternion_of(axes.T[None]))
+        place, turn = PLANE, quaternion_of(axes.T[None])
         turning = parts.frame(PLANE, quaternion=np.repeat(turn, dataset.sizes["time"], axis=0))
     up, upright = np.array([0.0, 0.0, 1.0]), np.array([[0, 0, -1.5], [0, 0, 1.75]])
     spokes = [np.outer([-1.75, 1.75], direction_of(0.0, np.pi * k / 6)) for k in range(6)]
@@ -324,7 +324,7 @@ def facing(dataset: xarray.Dataset, subject: Subject, figure: Array, marks: list
     x, _, z = np.eye(3)
     words = "longitude and latitude zero"
     shown = [
-        *parts.frame(EYE, quaternion=parts.viewer_quaternion(turned), scale=stretched),
+        *parts.frame(EYE, quaternion=turned, scale=stretched),
         *trail("sub_source", parts.SOURCE, above, point, place=BODY, head=True, lasting=lasting),
         *marks,
         lines("limb", parts.FAINT, [parts.circle(1.0, x)], place=EYE, width=1.4, strength=0.8),

@@ -252,7 +252,7 @@ def _in_local_frame(
     words = f"trace of the body axis that points {name if far else 'down'}"
     start = np.zeros(3)
     shown = [
-        *parts.frame("local", quaternion=parts.viewer_quaternion(quaternion_of(local))),
+        *parts.frame("local", quaternion=quaternion_of(local)),
         *fixed_arrow("nadir", name, parts.SOURCE, start, [0, 0, 1.75], f"nadir: {name}", place="local"),
         *fixed_arrow("forward", "forward", FORWARD, start, [1.75, 0, 0], "along the orbit", place="local"),
         *fixed_arrow("normal", "normal", NORMAL, start, [0, -1.6, 0], "the orbit's normal", place="local"),

@@ -8,6 +8,7 @@ a wheel that spins up is seen to do so, and which of several is the fastest.
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import xarray
@@ -61,8 +62,7 @@ def add_wheels(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> N
         beside = middle * rotor.axis + 1.2 * radius * signals.across(rotor.axis)[0]
         words = f"rotor {rotor.name}" + (f", drawn turning {slower:g} times slower" if slower > 1 else "")
         axle, place = np.outer([0.0, tops[key]], rotor.axis), f"{BODY}/{name}"
-        turning = parts.viewer_quaternion(_turning(dataset, rotor, slower))
-        stage.parts.extend(parts.frame(place, quaternion=turning))
+        stage.parts.extend(parts.frame(place, quaternion=_turning(dataset, rotor, slower)))
         stage.parts.append(parts.solid(parts.around(place, "disc"), mesh))
         stage.parts.append(parts.spot(f"{name}/label", rotor.name, _MARK, beside, BODY))
         stage.parts.append(lines(f"{name}/axle", _MARK, [axle], words, place=BODY, width=2.0, strength=0.7))
@@ -112,7 +112,7 @@ def _momenta(dataset: xarray.Dataset, stage: Stage, found: list[RecordedRotor], 
     shares = ((whole - inner, "body", OF_BODY, of_body, 0.8), (inner, "rotor", OF_WHEELS, of_wheels, 1.0))
     for vectors, name, color, words, at in shares:
         label, shown = "rotors" if name == "rotor" else name, vectors * factor
-        more = {"place": BODY, "label_at": at, "radius": 0.018}
+        more: dict[str, Any] = {"place": BODY, "label_at": at, "radius": 0.018}
         stage.parts.append(arrow(f"{name}_momentum", label, color, shown, words, **more))
     stage.parts.extend(trail("momentum_path", parts.POLHODE, whole * factor, moving, place=BODY))
     notes += [

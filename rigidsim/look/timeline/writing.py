@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import rerun as rr
@@ -248,8 +248,8 @@ def attitude_differences(named: Sequence[tuple[str, xarray.Dataset]]) -> Plot | 
             found[f"{legible(name)} from {legible(leading)}"] = np.maximum(angle, _FLOOR)
     if not found:
         return None
-    title, table, hues = "Angle between the attitudes", np.stack([*found.values()], axis=1), PALETTE[1:]
-    return Plot("difference", title, table, [*found], "rad", hues, place="drift", log=True)
+    title, angles, hues = "Angle between the attitudes", np.stack([*found.values()], axis=1), PALETTE[1:]
+    return Plot("difference", title, angles, [*found], "rad", hues, place="drift", log=True)
 
 
 # ---- the page: scene, legend, plots, and summary
@@ -341,7 +341,7 @@ def beside_plots(
 
 def page_of(content: rrb.View | rrb.Container, panel: rrb.TimePanel, *, hidden: bool) -> rrb.Blueprint:
     """A page, of a picture without the viewer's own bars."""
-    state = "hidden" if hidden else "collapsed"
+    state: Literal["hidden", "collapsed"] = "hidden" if hidden else "collapsed"
     bars = [rrb.TopPanel(state="hidden")] if hidden else []
     return rrb.Blueprint(
         content, rrb.BlueprintPanel(state=state), rrb.SelectionPanel(state=state), *bars, panel
