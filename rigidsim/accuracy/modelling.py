@@ -367,7 +367,8 @@ def in_model(
 ) -> InitialValueProblem:
     """A scene's motion in a model of some level, in double precision; ``average`` if it is known already."""
     config = scene.config.as_motion(names, precision="double", tolerance="auto", formulation="auto")
-    # geodetic precession adds to either alike, and a window starts as the full motion does
+    # geodetic precession adds to either alike, tides hardly act within a window, which starts as the full
+    # motion does
     update = {
         "level": level,
         "short_period": short_period,
@@ -375,7 +376,7 @@ def in_model(
         "geodetic_precession": False,
     }
     model = config.model.model_copy(update=update)
-    plain = replace(scene, config=config.model_copy(update={"model": model}), events=())
+    plain = replace(scene, config=config.model_copy(update={"model": model, "tides": None}), events=())
     return compactly(prepare_scene(prepared.experiment, plain, loads=prepared.python_loads, along=average))
 
 

@@ -394,6 +394,50 @@ class PlacedOnOrbit(Placement):
 
 
 @dataclass(frozen=True)
+class PlacedInPlane(Placement):
+    """A source on an orbit in the moving plane of another one's, averaged over its node there.
+
+    Attributes:
+        reference: placement of the other one, on an orbit by elements or by a table.
+        mean_motion: rad/s.
+    """
+
+    reference: Placement
+    semi_major_axis: Any
+    eccentricity: Any
+    inclination: Any
+    mean_motion: Any
+
+    @property
+    def plane(self) -> OrbitPlane:  # type: ignore[override]
+        if self.reference.table is not None:
+            return table_plane(self.reference.table)
+        return kepler_plane(required(self.reference.orbit))
+
+    def distance(self, context: Any) -> Any:
+        return self.semi_major_axis
+
+    def nearest(self, scene: Setting) -> Any:
+        return self.semi_major_axis * (1 - self.eccentricity)
+
+    def at_start(self, scene: Setting) -> Vector:
+        """A place at its distance, for sizes: its anomaly isn't known."""
+        place = self.reference.at_start(scene)
+        size = self.semi_major_axis / norm(scene.context, place)
+        return [size * x for x in place]
+
+    def seen(self, m: Kinematics) -> SourcePlace:
+        what = (
+            'given with node = "averaged", which has a plane and no place; only averages over orbits take it'
+        )
+        raise ConfigError(Problem("[[loads]] plane_of", what))
+
+    def circuit(self, context: Any) -> Circuit:
+        e, slow = float(self.eccentricity), self.reference.circuit(context).slow_rate
+        return Circuit(float(self.mean_motion), e, (1 - e) ** -3, slow)
+
+
+@dataclass(frozen=True)
 class PlacedByTable(Placement):
     """A source on a tabulated orbit."""
 

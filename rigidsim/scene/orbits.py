@@ -33,6 +33,7 @@ from rigidsim.scene.fields import (
     name_or_vector,
     one_of,
     only_with,
+    together,
 )
 from rigidsim.scene.kepler import Ellipse, combined, plane_vectors
 from rigidsim.scene.orbit_tables.elements import read_table
@@ -69,6 +70,9 @@ class Elements(Ellipse):
         one_of(*MEAN_MOTION_KEYS, least=0),
         excludes("table", "node_rate", "periapsis_rate"),
         only_with("table", *_OF_TABLES),
+        together("plane_of", "node"),
+        excludes("plane_of", "table", "ascending_node", "node_rate", "periapsis_rate"),
+        excludes("plane_of", "periapsis", "mean_anomaly", *MEAN_MOTION_KEYS),
     )
 
     table: StrictStr | None = Field(None, examples=["mars_elements.csv"])
@@ -87,6 +91,10 @@ class Elements(Ellipse):
     """
     window: Positive[Second] | None = Field(None, examples=["2 kyr"])
     """time over which osculating elements are averaged, by Hann's weights"""
+    plane_of: StrictStr | None = Field(None, examples=["sun"])
+    """name of the load from whose moving orbit plane the inclination counts"""
+    node: Literal["averaged"] | None = None
+    """of an orbit in such a plane: averaged over the node, as of the Moon on the moving ecliptic"""
     node_rate: Rate = Field(ZERO, examples=["-19.3 deg/yr"])
     """rate of the ascending node"""
     periapsis_rate: Rate = ZERO

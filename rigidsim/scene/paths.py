@@ -19,7 +19,7 @@ from rigidsim.scene.validation_messages import nearest, shown
 ARRAYS_OF_TABLES = ("loads", "bodies", "rotors", "states", "events", "fit.data")
 _TABLES = (
     "body", "initial", "ephemeris", "frame", "time", "model", "integrator", "output", "limits", "parameters",
-    "sweep", "fit", "tables",
+    "sweep", "fit", "tables", "tides",
 )  # fmt: skip
 _PART = re.compile(r"""\s*(?:"([^"\n]+)"|'([^'\n]+)'|([^\[\].\"']+))((?:\[\d{1,9}\])*)\s*(\.|$)""")
 

@@ -32,7 +32,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import units
 from rigidsim.scene.bodies.body import Body
 from rigidsim.scene.bodies.presets import PRESETS
-from rigidsim.scene.choices import AUTO, DEFAULT_METHOD, FORMULATIONS, METHODS, REDUCED
+from rigidsim.scene.choices import AUTO, DEFAULT_METHOD, FORMULATIONS, METHODS, ORBIT_AVERAGED, REDUCED
 from rigidsim.scene.exact import ZERO, ExactNumber, parse_number
 from rigidsim.scene.expressions.names import BODY_NAMES
 from rigidsim.scene.expressions.tree import RESERVED
@@ -186,6 +186,23 @@ class Model(ConfigTable):
     def reduced(self) -> bool:
         """Whether the model averages anything."""
         return self.level in REDUCED
+
+
+class TidesTable(ConfigTable):
+    """``[tides]``: slow changes of the rotation, and of the distance of what raises the tides."""
+
+    model: Literal["linear", "constant_lag"] = "linear"
+    """linear has the present rates of the Earth and Moon for all times; constant_lag follows the distance"""
+    raised_by: EachOnce[StrictStr] = Field(min_length=1, examples=[["moon"]])
+    """names of loads whose sources raise tides"""
+    dissipation: NotNegative[Dimensionless] = ExactNumber(Fraction(1))
+    """tidal dissipation relative to the present one, Td of the literature"""
+    obliquity: StrictBool = False
+    """whether tides change the obliquity as well"""
+    radius: Positive[Metre] | None = Field(None, examples=["6378136.3 m"])
+    """of the body, for constant_lag; by default the Earth's"""
+    love_lag: NotNegative[Second] | None = Field(None, examples=["194.895 s"])
+    """Love number k2 times the lag, for constant_lag; by default the Earth's of La2004, 0.305 times 639 s"""
 
 
 class Insolation(ConfigTable):
@@ -655,6 +672,8 @@ class Config(ConfigTable):
     """name of the space axes, and the references of angles"""
     time: Time
     """time span and sample times"""
+    tides: TidesTable | None = None
+    """slow changes of rotation and of the Moon's distance, in orbit_averaged motions"""
     model: Model = Field(default_factory=Model.model_construct)
     """the full motion, or an average of it"""
     integrator: Integrator = Field(default_factory=Integrator.model_construct)
@@ -676,6 +695,15 @@ class Config(ConfigTable):
     def texts(self) -> dict[str, str]:
         """Texts of tables by name."""
         return {name: table.text for name, table in self.tables.items() if table.text is not None}
+
+    @model_validator(mode="after")
+    def _tides_are_of_averages(self) -> Config:
+        model = self.model
+        fits = model.level == ORBIT_AVERAGED and model.order == 1 and not model.short_period
+        if self.tides is not None and not fits:
+            raise refuse('[tides] is for [model] level = "orbit_averaged" with order = 1, no short_period; '
+                         "change these keys, or leave [tides] out")  # fmt: skip
+        return self
 
     @model_validator(mode="after")
     def _dated(self) -> Config:
@@ -767,7 +795,7 @@ _MOST_PROBLEMS = 200  # worth reporting; a file of a million wrong keys has said
 def _what(allowed: Callable[[], list[str]], error: Mapping[str, Any]) -> str:
     kind, context = error["type"], error.get("ctx", {})
     location, given = tuple(error["loc"]), error["input"]
-    effect = len(location) == 1 or location[0] in ("loads", "initial")
+    effect = len(location) < 2 or location[0] in ("loads", "initial")
     if kind == "extra_forbidden":
         key, fields = str(location[-1]), allowed()
         return f"unknown key{meant(key, fields, effect=effect)}; allowed: {', '.join(fields)}"

@@ -140,3 +140,130 @@ def test_a_long_table_is_read_by_its_digest(
     table.unlink()
     with pytest.raises(rigidsim.ConfigError, match="which isn't there: looked for in"):
         rigidsim.verify("runs/deep")
+
+
+MOON, MOON_AXIS, MOON_TILT, MOON_E = 4.9028e12, 3.844e8, np.radians(5.145), 0.0549
+LINEAR = 2.705994e-10, 2 * 1.4516496e-10  # published, a year: of w and of r^-3
+MASS, RADIUS, LAG, NEWTON = 5.9722e24, 6378136.3, 194.895, 6.67430e-11
+MOMENT = 0.3307 * MASS * RADIUS**2
+WITH_MOON = f"""[[loads]]
+kind = "gravity_gradient"
+name = "moon"
+gravitational_parameter = {MOON}
+orbit = {{plane_of = "sun", node = "averaged", semi_major_axis = {MOON_AXIS}, inclination = "5.145 deg", \
+eccentricity = {MOON_E}}}
+[tides]
+model = "MODEL"
+raised_by = RAISED
+dissipation = DISSIPATION
+obliquity = true
+"""
+
+
+def tidal_truth(
+    years: np.ndarray, model: str, raised: list[str], dissipation: float
+) -> dict[str, np.ndarray]:
+    """Axis, w and the Moon's distance over the initial one, by DOP853, as deep-time studies write them."""
+    sun, moon = (  # strength, axis, factor of the node's average, mean motion, mass
+        (STRENGTH, AXIS, 1.0, STRENGTH / NEWTON),
+        (MOON, MOON_AXIS, (1 - 1.5 * np.sin(MOON_TILT) ** 2) * (1 - MOON_E**2) ** -1.5, MOON / NEWTON),
+    )
+    sources = {"sun": sun, "moon": moon}
+    pace = {name: np.sqrt((gm + NEWTON * MASS) / a**3) for name, (gm, a, _, _) in sources.items()}
+    k = {
+        name: 3 * dissipation * NEWTON * m**2 * RADIUS**5 * LAG / (MOMENT * a**6)
+        for name, (_, a, _, m) in sources.items()
+    }
+
+    def slopes(second: float, y: np.ndarray) -> np.ndarray:
+        s, w, far = y[:3], y[3], dict(zip(("sun", "moon"), y[4:], strict=True))
+        normal, e_cos, e_sin = normal_of(second / YEAR)
+        x, change, spin, away = float(normal @ s), np.zeros(3), 0.0, []
+        if model == "linear":
+            w, cubed = (1 - rate * dissipation * second / YEAR for rate in LINEAR)
+            change += dissipation * -4.17e-19 * (normal - x * s) / np.sqrt(1 - x * x)
+        for name, (gm, a, factor, m) in sources.items():
+            r = far[name]
+            if model == "linear":
+                grown = cubed if name in raised else 1.0
+            else:
+                grown = r**-3
+                n = pace[name] * r**-1.5
+                size = k[name] * r**-6 if name in raised else 0.0
+                spin -= size * (w * (1 + x * x) / 2 - x * n / SPIN)
+                reduced = m * MASS / (m + MASS)
+                away.append(2 * MOMENT * size * (SPIN * w * x - n) / (reduced * n * a * a * r))
+                change -= size * (x / 2 - n / (SPIN * w)) * (normal - x * s)
+            rate = 1.5 * gm * RATIO / (SPIN * a**3) * factor * w * grown
+            if name == "sun":
+                rate *= (1 - e_cos**2 - e_sin**2) ** -1.5
+            change += rate * x * np.cross(s, normal)
+        return np.concatenate([change, [spin], away or [0.0, 0.0]])
+
+    start = np.array([0, np.sin(TILT), np.cos(TILT)])
+    begin = np.concatenate([start, [1.0, 1.0, 1.0]])
+    seconds = years * YEAR
+    y = solve_ivp(slopes, (0, seconds[-1]), begin, "DOP853", seconds, rtol=1e-13, atol=1e-14).y
+    w, r = y[3], y[5]
+    if model == "linear":
+        w, r = (1 - rate * dissipation * years for rate in LINEAR)
+        r = r ** (-1 / 3)
+    return {"axis": y[:3].T, "w": w, "r": r}
+
+
+def with_moon(config: Path, model: str, raised: list[str], dissipation: float) -> str:
+    """The config with the Moon on the moving ecliptic, and tides."""
+    text = config.read_text().replace('kind = "gravity_gradient"', 'kind = "gravity_gradient"\nname = "sun"')
+    text = text.replace(
+        f"principal_moments = [{1 - RATIO:.17g}, {1 - RATIO:.17g}, 1]",
+        "principal_moments = [{0!r}, {0!r}, {1!r}]\nmass = {2}".format((1 - RATIO) * MOMENT, MOMENT, MASS),
+    )
+    tides = WITH_MOON.replace("MODEL", model).replace("RAISED", str(raised).replace("'", '"'))
+    text = text.replace("[frame]", tides.replace("DISSIPATION", repr(dissipation)) + "[frame]")
+    text = text.replace('"insolation"]', '"rotation_period", "tidal_distance", "momentum_axis"]')
+    return text
+
+
+@pytest.mark.parametrize(
+    ("model", "raised", "dissipation"),
+    [("linear", ["moon"], 1.0), ("linear", ["moon"], 2000.0), ("constant_lag", ["moon", "sun"], 2000.0)],
+)
+def test_tides_are_those_of_the_literature(
+    config: Path, model: str, raised: list[str], dissipation: float
+) -> None:
+    config.write_text(with_moon(config, model, raised, dissipation))
+    data = loaded(rigidsim.run(config, out=None))
+    known = tidal_truth(data.time.values / YEAR, model, raised, dissipation)
+    np.testing.assert_allclose(data.momentum_axis, known["axis"], rtol=0, atol=2e-10)
+    np.testing.assert_allclose(2 * np.pi / SPIN / data.rotation_period, known["w"], rtol=1e-10)
+    np.testing.assert_allclose(data.tidal_distance / MOON_AXIS, known["r"], rtol=1e-10)
+    if dissipation > 1:
+        assert abs(known["w"][-1] - 1) > 0.005  # the tides are seen
+
+
+REFUSED: dict[str, tuple[object, str]] = {
+    "model.order": (2, "with order = 1, no short_period"),
+    "tides.raised_by": (["mon"], 'given "mon"; did you mean "moon"?'),
+    "loads[1].orbit.plane_of": ("sum", 'given "sum"; did you mean "sun"?'),
+    "model.start": ("osculating", 'order = 1 and start = "mean"'),
+    "initial.angular_velocity": ([0, 0, 1e-5], "for a body that turns at 1e-05 rad/s"),
+    "loads[1].orbit.node_rate": ("1 deg/yr", "given node_rate with plane_of"),
+}
+
+
+@pytest.mark.parametrize("key", REFUSED)
+def test_tides_that_a_scene_has_not_are_refused(config: Path, key: str) -> None:
+    config.write_text(with_moon(config, "linear", ["moon"], 1.0))
+    value, says = REFUSED[key]
+    with pytest.raises(rigidsim.ConfigError) as caught:
+        rigidsim.run(rigidsim.load(config, overrides={key: value}), out=None)
+    assert says in str(caught.value)
+
+
+def test_the_error_of_an_average_over_the_node_is_reported_as_unknown(config: Path) -> None:
+    config.write_text(
+        with_moon(config, "linear", ["moon"], 1.0).replace("estimate = false", "estimate = true")
+    )
+    run = rigidsim.run(config, out=None)
+    assert run.summary["modelling"]["unmeasured"] == "full_refused"
+    assert "which has a plane and no place" in run.summary["modelling"]["how"]

@@ -58,9 +58,11 @@ from rigidsim.model.averaged.free_motion import (
 )
 from rigidsim.model.averaged.resonance import Resonance, SlowStart
 from rigidsim.model.averaged.sources import Source, nutation, sources_of, unit
+from rigidsim.model.averaged.tides import Tides, tides_of
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Carrier, Mechanics, carried_beside
 from rigidsim.model.orbits import Carried
+from rigidsim.model.placements import PlacedInPlane
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling, scaled_numbers
 from rigidsim.model.state_blocks import BODY
@@ -103,7 +105,7 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
     odd = [load.title for load in alone if not reads_rates_alone(load)]
     kinks = surfaces_of(scene).found if alone and not odd else []
     places = [source.placement for source in sources if over_orbits]
-    unsuited = [x.name for x in places if not (x.orbit or x.table or x.rests)]
+    unsuited = [x.name for x in places if not (x.orbit or x.table or x.rests or isinstance(x, PlacedInPlane))]
     said = [
         (scene.free_flight, "the body has a position and flies", ""),
         (carried_beside(loads), carried_beside(loads), ""),
@@ -798,7 +800,7 @@ OBSERVABLES = (
     "angular_momentum", "angular_momentum_norm", "energy", "figure_axis", "spin_axis", "momentum_axis",
     "right_ascension", "declination", "obliquity", "node_longitude", "point_mass_position", "precession",
     "longitude_of_perihelion_of_date", "climatic_precession", "orbit_eccentricity", "insolation",
-    "source_position",
+    "source_position", "tidal_distance",
     "point_mass_velocity", "orbital_energy", "orbital_angular_momentum", "orbital_linear_momentum",
 )  # fmt: skip
 """Observables that an averaged motion can provide, as far as the scene has them."""
@@ -818,6 +820,7 @@ class Average:
     resonance: Resonance | None = None
     slow: SlowStart | None = None
     driven: Driven | None = None  # what torques of the body alone do
+    tides: Tides | None = None
 
     @property
     def over_orbits(self) -> bool:
@@ -826,7 +829,8 @@ class Average:
 
     def provides(self, name: str) -> bool:
         """Whether it can provide an observable, as far as the scene has it."""
-        return name in OBSERVABLES or (name == "resonant_angle" and self.resonance is not None)
+        turning = self.tides is not None and name in ("rotation_rate", "rotation_period")
+        return name in OBSERVABLES or turning or (name == "resonant_angle" and self.resonance is not None)
 
     @property
     def longitude(self) -> Carried:
@@ -905,6 +909,9 @@ def average_of(
             resonance = None if along.resonance is None else along.resonance.with_source_in(sources)
         else:
             resonance = None if alone else kept_resonance(scene, wobble, sources, motion)
+        if scene.config.tides is not None and (alone or resonance is not None or not _figure(scene, motion)):
+            what = "given for a body in resonance, under other torques, or one that tumbles; leave it out"
+            raise ConfigError(Problem("[tides]", what))
         if resonance is not None:
             return _resonant(scene, resonance, sources)
         vector = apply(matrix, momentum)
@@ -921,7 +928,8 @@ def average_of(
         ) from None
     start, energy = unit(context, vector), dot(momentum, scene.angular_velocity) / 2
     figure = _figure(scene, motion)
-    found = Average(table.level, table.short_period, motion, sources, start, energy, figure)
+    tides = tides_of(scene, sources, motion.momentum)
+    found = Average(table.level, table.short_period, motion, sources, start, energy, figure, tides=tides)
     if found.over_orbits and table.start != MEAN:
         return replace(found, start=_mean_over_orbits(scene, found))
     return found

@@ -198,11 +198,17 @@ class OrbitTerms:
             return as_factor(self.number(size)) * value
         return as_factor(self.number(size * value))
 
-    def secular(self, rate: Any, s: list[Symbolic], *, second: bool) -> list[Symbolic]:
-        """Vector whose product with s is s', to first or second order; k (mpf) is that at the mean axis."""
+    def secular(
+        self, rate: Any, s: list[Symbolic], *, second: bool, growth: Symbolic | None = None
+    ) -> list[Symbolic]:
+        """Vector whose product with s is s', to first or second order; k (mpf) is that at the mean axis, and
+        grows by a factor to first order.
+        """
         normal, ellipse = self.normal, self.ellipse
         z = dot(normal, s)
         factor = self._times(-rate, ellipse.secular_factor * self.cubed) * z
+        if growth is not None:
+            factor = factor * growth
         if second:  # (k^2 / 4) c1 (1 - 3 z^2)
             across = ellipse.across * (self.cubed * self.cubed) / ellipse.motion
             factor = factor + self._times(rate * rate / 4, across) * (3.0 * (z * z) - 1.0)

@@ -32,6 +32,7 @@ from rigidsim.model.frames import refuse_without_plane
 from rigidsim.model.load import Load, Term
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.orbits import ElementStates, OrbitStates, element_states
+from rigidsim.model.placements import PlacedInPlane
 from rigidsim.model.rotations import Symbolic, apply, quaternion_kinematics, quaternion_matrix
 from rigidsim.model.scaling import Rounder, choose_scaling
 from rigidsim.model.state_blocks import AttitudeStates, StateBlock
@@ -73,7 +74,7 @@ class AveragedMechanics(Mechanics):
 
     def _place(self, orbit: KeplerOrbit) -> OrbitPlace:
         """Position of a source on its orbit."""
-        mean = self._moving(orbit.mean_anomaly, orbit.mean_motion)
+        mean = self.moving(orbit.mean_anomaly, orbit.mean_motion)
         e = hy.expression(self.number(orbit.eccentricity))
         anomaly = mean if orbit.circular else hy.kepE(e, mean)
         return OrbitPlace(hy.cos(anomaly), hy.sin(anomaly), *self.plane_vectors(orbit))
@@ -96,10 +97,10 @@ class AveragedMechanics(Mechanics):
         if rate == 0:
             c, s = cosine_and_sine(self.scene.context, angle)
             return as_factor(self.number(c)), as_factor(self.number(s))
-        moving = self._moving(angle, rate)
+        moving = self.moving(angle, rate)
         return hy.cos(moving), hy.sin(moving)
 
-    def _moving(self, angle: Any, rate: Any) -> Symbolic:
+    def moving(self, angle: Any, rate: Any) -> Symbolic:
         """An angle that advances uniformly."""
         start = hy.expression(self.number(angle))
         if rate == 0:
@@ -128,7 +129,12 @@ class AveragedMechanics(Mechanics):
         """What an average over the source's orbit is made of."""
         if source.of.table is not None:
             return OrbitTerms.of_elements(self._elements[source.of.table], self.number)
-        context, orbit = self.scene.context, self.carried(source.of.orbit)
+        context, placed = self.scene.context, source.of.placement
+        if isinstance(placed, PlacedInPlane):
+            e = placed.eccentricity
+            ellipse = Ellipse(e, e * e, context.sqrt(1 - e * e), placed.mean_motion * self.unit, bool(e == 0))
+            return OrbitTerms(ellipse, self.normal(source), None, context.one, self.number)
+        orbit = self.carried(source.of.orbit)
         ellipse = Ellipse.of(context, orbit)
         ellipse = replace(ellipse, motion=ellipse.motion * self.unit)
         fixed = orbit.fixed_plane and not orbit.circular
@@ -150,7 +156,10 @@ class AveragedMechanics(Mechanics):
         s = self.direction
         geodetic = self._geodetic()
         if self.average.over_orbits:
-            return cross(total([self._secular(source) for source in self.average.sources] + geodetic), s)
+            found = cross(total([self._secular(source) for source in self.average.sources] + geodetic), s)
+            return (
+                found if self.average.tides is None else total([found, *self.average.tides.turned(self, s)])
+            )
         pull = self._pull(s)
         if self.average.figure == 0 or not self._second:
             return cross(total([pull, *geodetic]), s)
@@ -187,10 +196,22 @@ class AveragedMechanics(Mechanics):
 
     def _secular(self, source: Source) -> list[Symbolic]:
         """Secular pull -(k/2) (1 - e^2)^(-3/2) (n . s) n to second order; the pull of a source at rest."""
-        if not source.has_elements:
+        placed = source.of.placement
+        if not source.has_elements and not isinstance(placed, PlacedInPlane):
             return self._pull_of(source, self.direction)
-        return self._terms(source).secular(
-            self.average.rate(source) * self.unit, self.direction, second=self._second
+        rate, growth = self.average.rate(source) * self.unit, None
+        if self.average.tides is not None:
+            growth = self.average.tides.growth(self, source)
+        if isinstance(placed, PlacedInPlane):  # <n n^T> over the node
+            rate = rate * (1 - 3 * self.scene.context.sin(placed.inclination) ** 2 / 2)
+        return self._terms(source).secular(rate, self.direction, second=self._second, growth=growth)
+
+    def normal(self, source: Source) -> list[Symbolic]:
+        """Normal of the plane of a source's orbit, space axes."""
+        placed = source.of.placement
+        placed = placed.reference if isinstance(placed, PlacedInPlane) else placed
+        return (
+            self._normal(required(placed.orbit)) if placed.table is None else self.table(placed.table).normal
         )
 
     def _pull(self, s: list[Symbolic]) -> list[Symbolic]:
@@ -237,7 +258,8 @@ class AveragedMechanics(Mechanics):
 
     @cached_property
     def momentum_size(self) -> Any:
-        return self.scaled(self.average.motion.momentum, -self.scaling.momentum)
+        size = self.scaled(self.average.motion.momentum, -self.scaling.momentum)
+        return size if self.average.tides is None else size * self.average.tides.spin_ratio(self)
 
     @cached_property
     def momentum_space(self) -> list[Symbolic]:
@@ -263,8 +285,12 @@ class AveragedMechanics(Mechanics):
 
     @cached_property
     def rotational_energy(self) -> Symbolic:
-        """Energy of the free rotation, a constant."""
-        return hy.expression(self.scaled(self.average.energy, -self.scaling.energy))
+        """Energy of the free rotation."""
+        energy = hy.expression(self.scaled(self.average.energy, -self.scaling.energy))
+        if self.average.tides is None:
+            return energy
+        spin = self.average.tides.spin_ratio(self)
+        return energy * (spin * spin)
 
     # --- loads ----------------------------------------------------------------------------------------------
 
@@ -689,6 +715,8 @@ class Averaged(Formulation):
         blocks = [StateBlock(DIRECTION, m.derivatives, average.start, why=why)]
         if isinstance(m, DrivenMechanics):
             blocks.append(_amplitudes(m))
+        if average.tides is not None and (block := average.tides.block(m, s)) is not None:
+            blocks.append(block)
         for orbit in plan.tables:
             what = "elements of" if average.over_orbits else "where"
             which = "the source's orbit" if average.over_orbits else "the source is"

@@ -66,6 +66,7 @@ from rigidsim.model.placements import (
     PlacedByKernel,
     PlacedBySeries,
     PlacedByTable,
+    PlacedInPlane,
     PlacedOnOrbit,
     Placement,
     SourcePlace,
@@ -78,6 +79,7 @@ from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, across, cross, dot, norm, parallel, unit_vectors
 from rigidsim.scene.bodies.gravity_field import LEAST, MOST, GravityField, HarmonicsTable
 from rigidsim.scene.cautions import Caution, WarningCode
+from rigidsim.scene.choices import MEAN, ORBIT_AVERAGED
 from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.exact import ZERO, parse_number
 from rigidsim.scene.fields import (
@@ -101,6 +103,7 @@ from rigidsim.scene.fields import (
 from rigidsim.scene.kernels.series import exactly
 from rigidsim.scene.orbits import (
     SIDES,
+    Elements,
     KeplerOrbit,
     Orbit,
     OrbitFields,
@@ -108,7 +111,7 @@ from rigidsim.scene.orbits import (
     resolve_orbit,
     resolve_tabulated_orbit,
 )
-from rigidsim.scene.point_masses import PointMasses
+from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, PointMasses
 from rigidsim.scene.readable import length_text
 from rigidsim.scene.registry import (
     EffectPart,
@@ -122,6 +125,7 @@ from rigidsim.scene.registry import (
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.space_axes import ECLIPTIC, obliquity, to_ecliptic
 from rigidsim.scene.swept import plain
+from rigidsim.scene.validation_messages import nearest
 
 _CENTURY = 86400 * 36525  # s
 _ARCSEC = 3600 * 180
@@ -956,6 +960,8 @@ class GravityGradient(SceneLoad):
 def _distant(fields: GravityGradientFields, strength: Any, around: Setting) -> Placement:
     if fields.source is not None:
         return PlacedByKernel.of(fields.source, around)
+    if fields.elements is not None and fields.elements.plane_of is not None:
+        return _in_plane(fields.elements, strength, around)
     if fields.elements is not None and fields.elements.table is not None:
         return PlacedByTable(resolve_tabulated_orbit(fields.elements, strength, around))
     if fields.elements is not None:
@@ -979,6 +985,35 @@ def _distant(fields: GravityGradientFields, strength: Any, around: Setting) -> P
         around.fault("position", "given the origin, where the body is; another point is allowed"),
     )
     return PlacedAtRest(position)
+
+
+def _in_plane(elements: Elements, strength: Any, around: Setting) -> PlacedInPlane:
+    """An orbit in the plane of another load's, for the equations of precession in the literature."""
+    config, context = around.config, around.context
+    key, name = f"{elements.key}.plane_of", str(elements.plane_of)
+    on_orbits = {
+        load.name: number for number, load in enumerate(config.loads)
+        if isinstance(load, GravityGradientFields) and load.name and load.elements is not None
+        and load.elements.plane_of is None and getattr(load.elements, "body", None) is None
+    }  # fmt: skip
+    allowed = ", ".join(on_orbits) or "none; give a gravity_gradient with an orbit a name"
+    what = f'given "{name}"{nearest(name, on_orbits)}; allowed: {allowed}'
+    ensure(name in on_orbits, around.fault(key, what))
+    model = config.model
+    first = model.level == ORBIT_AVERAGED and model.order == 1 and model.start == MEAN
+    what = 'is for averaged orbits; give [model] level = "orbit_averaged", order = 1 and start = "mean"'
+    ensure(first, around.fault(key, what))
+    axis = elements.semi_major_axis
+    if axis is None:
+        raise around.fault(f"{elements.key}.semi_major_axis", "missing; it is needed")
+    other = config.loads[on_orbits[name]]
+    there = around.at("loads", on_orbits[name])
+    mass = context.zero if around.body.mass is None else around.body.mass
+    both = strength + context.mpf(GRAVITATIONAL_CONSTANT) * mass
+    return PlacedInPlane(
+        _distant(other, _strength(other, there), there), axis.at(context), elements.eccentricity.at(context),
+        elements.inclination.at(context), context.sqrt(both / axis.at(context) ** 3),
+    )  # fmt: skip
 
 
 @register_load

@@ -47,6 +47,7 @@ from collections.abc import Callable, Mapping
 
 import heyoka as hy
 
+from rigidsim.model.averaged.tides import Tides
 from rigidsim.model.frames import initial_normal, initial_plane, orbit_plane, reference_plane
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
@@ -219,6 +220,14 @@ AXES = (
 # --- rotation about the momentum ----------------------------------------------------------------------------
 
 
+def _rotation_rate(m: Mechanics) -> Symbolic:
+    """Of an averaged body, which has one as long as tides slow it."""
+    tides = None if m.average is None else m.average.tides
+    if tides is None:
+        return length(m.rates)
+    return m.scaled(tides.spin, m.scaling.time) * tides.spin_ratio(m)
+
+
 def _andoyer_momenta(m: Mechanics) -> list[Symbolic]:
     momentum, plane = m.momentum_body, reference_plane(m)
     figure = along(m.fixed(m.scene.figure.pole), momentum)
@@ -287,13 +296,13 @@ ROTATION = (
         ),
     ),
     Observable(
-        "rotation_rate", (), "rad s-1", "instantaneous rate of rotation", lambda m: [length(m.rates)],
+        "rotation_rate", (), "rad s-1", "instantaneous rate of rotation", lambda m: [_rotation_rate(m)],
         same_unit(lambda m: -m.scaling.time, 1), by_default=only_when_named,
         attributes=described_by("norm of the angular velocity"),
     ),
     Observable(
         "rotation_period", (), "s", "instantaneous period of rotation (sidereal length of day)",
-        lambda m: [m.number(2 * m.scene.context.pi) / length(m.rates)],
+        lambda m: [m.number(2 * m.scene.context.pi) / _rotation_rate(m)],
         same_unit(lambda m: m.scaling.time, 1), by_default=only_when_named,
         attributes=described_by("2 pi / rotation_rate, against the stars; infinite at rest"),
     ),
@@ -473,6 +482,20 @@ def _no_insolation(m: Mechanics) -> str | None:
     return _no_orbit(m)
 
 
+def _tides(m: Mechanics) -> Tides | None:
+    return None if m.average is None else m.average.tides
+
+
+def _no_tides(m: Mechanics) -> str | None:
+    return None if _tides(m) is not None else "it needs [tides]; add them, or leave it out"
+
+
+def _tidal_distance(m: Mechanics) -> list[Symbolic]:
+    tides = m.carried(_tides(m))
+    first = tides.raising[0]
+    return [m.number(first.source.of.placement.distance(m.scene.context)) * tides.distance_ratio(m, first)]
+
+
 def _attributes(convention: str) -> Callable[[Mechanics], Mapping[str, str]]:
     return described_by(
         f"{convention}; in the plane of the orbit of the first source with elements", figure=True
@@ -505,6 +528,10 @@ CLIMATE = (
         lambda m: [hy.sqrt(sum((x * x for x in _eccentric(m)), hy.expression(0.0)))],
         by_default=only_when_named, absent=_no_orbit,
         attributes=described_by("of the first source with elements"),
+    ),
+    Observable(
+        "tidal_distance", (), "m", "distance of the first source that raises tides", _tidal_distance,
+        lambda m: [0], by_default=only_when_named, absent=_no_tides,
     ),
     Observable(
         "insolation", (), "W m-2", "mean insolation of a day", _insolation,

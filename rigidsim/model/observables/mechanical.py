@@ -180,7 +180,7 @@ def _torque_free(m: Mechanics) -> str | None:
 def _momentum_kept(m: Mechanics) -> str | None:
     if m.average is None:
         return _torque_free(m)
-    changes = m.average.driven is not None or m.average.resonance is not None
+    changes = m.average.driven or m.average.resonance or m.average.tides
     return (
         None
         if changes
