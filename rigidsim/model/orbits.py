@@ -98,7 +98,7 @@ class PieceSeries(Protocol):
     """
 
     knots: list[Any]
-    at_once = 32
+    at_once: int = 32
 
     @property
     def states(self) -> list[str]:
@@ -513,7 +513,7 @@ class TablePieces(PieceSeries):
                 type(number(orbit.context.one))
             )
         else:
-            knots = np.array([number(scaling.internal(orbit.time(row), orbit.context)) for row in rows])
+            knots = np.array([number(scaling.internal(orbit.time(int(row)), orbit.context)) for row in rows])
         # of rows that the precision can't distinguish the last one counts
         last = np.append(knots[1:] != knots[:-1], np.ones(len(knots[:1]), dtype=bool)).astype(bool)
         self.knots = list(knots[last])

@@ -309,7 +309,7 @@ def _tabulated_orbit(
     """A table's orbit, made once: of its text, the elements it lacks, an mpf's parts for Kepler's law, and
     the name of space axes; ``opposite`` as in ``Elements``.
     """
-    given = dict(constants)
+    given: dict[str, Any] = dict(constants)
     format, frame, window = (given.pop(key, None) for key in _OF_TABLES)
     table = read_table(text, bits, narrow=narrow, format=format)
     context = table.context

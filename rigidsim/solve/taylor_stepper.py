@@ -264,7 +264,8 @@ class TaylorStepper(Stepper):
         far: Far | None = None,
     ) -> bool:
         """Take at most ``count`` steps, none beyond a time, or as a requirement says: whether all is well."""
-        before, longest, called = self._integrator.dtime, self._longest, [] if samples is None else [samples]
+        before, longest = self._integrator.dtime, self._longest
+        called: list[StepCallback] = [] if samples is None else [samples]
         if far is not None:
             longest, called = min(far[1], longest), [*called, far[2]]
         outcome, smallest, largest, taken, *_ = self._integrator.propagate_until(

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import heyoka as hy
 import numpy as np
@@ -37,9 +37,6 @@ from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import TidesTable
 from rigidsim.scene.validation_messages import nearest
-
-if TYPE_CHECKING:
-    from rigidsim.model.formulations.averaged import AveragedMechanics
 
 LINEAR = "linear"
 SPIN = "tidal_spin"
@@ -99,20 +96,20 @@ class Tides:
         spin, motion = (dissipation * context.mpf(x) / year for x in (_SPIN_RATE, _MOTION_RATE))
         return spin, 2 * motion, dissipation * context.mpf(_OBLIQUITY_RATE)
 
-    # --- in equations ---------------------------------------------------------------------------------------
+    # --- in equations, of averaged mechanics m --------------------------------------------------------------
 
-    def _line(self, m: AveragedMechanics, slope: Any) -> Symbolic:
+    def _line(self, m: Any, slope: Any) -> Symbolic:
         return m.moving(1 - slope * self.start, slope)
 
-    def spin_ratio(self, m: AveragedMechanics) -> Symbolic:
+    def spin_ratio(self, m: Any) -> Symbolic:
         """w."""
         return self._line(m, self.slopes[0]) if self.linear else hy.make_vars(SPIN)
 
-    def distance_ratio(self, m: AveragedMechanics, one: Raising) -> Symbolic:
+    def distance_ratio(self, m: Any, one: Raising) -> Symbolic:
         """r."""
         return self._line(m, self.slopes[1]) ** (-1.0 / 3) if self.linear else hy.make_vars(one.state)
 
-    def growth(self, m: AveragedMechanics, source: Source) -> Symbolic:
+    def growth(self, m: Any, source: Source) -> Symbolic:
         """Factor w r^-3 of the precession by a source."""
         spin = self.spin_ratio(m)
         one = next((one for one in self.raising if one.source.number == source.number), None)
@@ -120,7 +117,7 @@ class Tides:
             return spin
         return spin * (self._line(m, self.slopes[1]) if self.linear else hy.make_vars(one.state) ** -3.0)
 
-    def block(self, m: AveragedMechanics, s: list[Symbolic]) -> StateBlock | None:
+    def block(self, m: Any, s: list[Symbolic]) -> StateBlock | None:
         """The states w and r of each source, per internal unit of time; None if they are known."""
         if self.linear:
             return None
@@ -136,7 +133,7 @@ class Tides:
         why = "tides slow the rotation and move what raises them away, relative to the start"
         return StateBlock(names, [hy.sum(slowed), *changes], [self.context.one] * len(names), why=why)
 
-    def turned(self, m: AveragedMechanics, s: list[Symbolic]) -> list[list[Symbolic]]:
+    def turned(self, m: Any, s: list[Symbolic]) -> list[list[Symbolic]]:
         """Changes of the direction s by tides, if asked for, per internal unit of time."""
         found = []
         for one in self.raising if self.table.obliquity else ():
