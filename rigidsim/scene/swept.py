@@ -281,28 +281,18 @@ class SweptContext:
         return np.array(found)[places]
 
     def decide(self, compare: Callable[[Any, Any], Any], left: Any, right: Any) -> bool:
-        """Compare as the first member does, and leave out whoever does so with another outcome."""
-        found = self.made(compare, self.convert(left), self.convert(right), of_arrays=self._deciding(compare))
-        return bool(found.values[0])
-
-    def agreed(self) -> np.ndarray:
-        """The mask ``agree``; Untraceable where the first member has no number to decide by."""
-        if not self.agree[0]:
-            raise self.out_of_range()
-        return self.agree
+        """Compare as the first member does, and leave out whoever does so with another outcome, or can't."""
+        pair = self.convert(left), self.convert(right)
+        outcomes = self.made(compare, *pair).values
+        self.agree &= outcomes == outcomes[0]
+        for x in pair:
+            self.agree &= np.isfinite(x.values if isinstance(x, Swept) else self.real_of(x))
+        return bool(outcomes[0])
 
     def out_of_range(self) -> Untraceable:
         """The error for a number of the first member alone, whatever the others have."""
         self.agree[:] = np.arange(len(self.agree)) == 0
         return Untraceable("a number outside the range of an operation, or of double precision")
-
-    def _deciding(self, compare: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
-        def outcomes(left: Any, right: Any) -> Any:
-            found = compare(left, right)
-            self.agree &= (found == found[0]) & np.isfinite(left) & np.isfinite(right)
-            return found
-
-        return outcomes
 
     # --- as mpmath's contexts have them -----------------------------------------------------------------
 
@@ -359,14 +349,10 @@ class SweptContext:
     def ldexp(self, value: Any, exponent: Any) -> Any:
         """``value * 2**exponent``."""
         if isinstance(exponent, Swept):
-            return value * self.made(np.ldexp, exponent, of_arrays=self._power_of_two)
+            return value * self.made(operator.pow, self.plain.mpf(2), exponent)
         if isinstance(value, Swept):
             return value * self.plain.ldexp(1, int(exponent))
         return self.plain.ldexp(value, int(exponent))
-
-    def _power_of_two(self, exponent: Any) -> Any:
-        doubles = exponent.astype(np.float64)
-        return self.reals(np.where(np.isfinite(doubles), np.ldexp(1.0, doubles.astype(np.int64)), np.nan))
 
     def frexp(self, value: Any) -> tuple[Any, Any]:
         """``(m, e)`` of ``value = m * 2**e`` with m from 0.5 to below 1 in size; no zero is allowed."""

@@ -226,7 +226,9 @@ class Family:
         self.system = System(plan_model(scene, like=like), self._number)
         for part in ("equations", "outputs", "invariants", "crossings", "rate_bound"):
             getattr(self.system, part)
-        self._chosen = np.flatnonzero(self._context.agreed())
+        if not self._context.agree[0]:  # a decision by a number that it hasn't
+            raise self._context.out_of_range()
+        self._chosen = np.flatnonzero(self._context.agree)
         numbers = [*self.system.initial, *(value for value, _ in self._swept.values())]
         found = np.array([self.doubles(value) for value in numbers])
         within = np.isfinite(found).all(axis=0)
