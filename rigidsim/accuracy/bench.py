@@ -25,13 +25,13 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from itertools import chain
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple
 
 import mpmath
 import numpy as np
@@ -152,10 +152,7 @@ class Worker:
         self._experiment, self._stopped = experiment, False
         self._child: tuple[subprocess.Popen[bytes], Connection] | None = None
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
         """Stop; what another thread waits for then has no answer."""
         self._stopped = True
         if self._child is not None:
@@ -264,7 +261,8 @@ def _plan(experiment: Experiment, budget: float) -> Plan:
     start, end = float(scene.start), float(scene.samples.last)
     prepared = prepare_scene(experiment, trial_scene(experiment, DEFAULT))
     corrected = assemble(prepared).steps()
-    pilot = run_pilot(corrected.stepper, prepared.clock, corrected.skip, steps=_PILOT_STEPS, warming=_WARMING)
+    corrected.skip(_WARMING)
+    pilot = run_pilot(prepared, corrected, steps=_PILOT_STEPS)
     whole = pilot.whole * pilot.seconds_per_step
     form, why = closed_form_if_any(scene)
     part, reference, quadruple, digits = (
@@ -424,7 +422,7 @@ def measure(
     tasks = [Task(s, plan.short_times if wide[s] else plan.times, _SINGLE * budget) for s in settings]
     report(f"attitudes of {len(settings)} settings")
     done, left_out = 0, (None, math.nan, f"left out: the budget of {budget:g} s was used up before its turn")
-    with Worker(experiment) as worker:
+    with closing(Worker(experiment)) as worker:
         found = _explored(experiment, worker, plan.references(), tasks, begun + _EXPLORING * budget)
         if problem := found.get(tasks[0], left_out)[2]:
             raise RigidsimError(
@@ -450,7 +448,7 @@ def measure(
         for repeat in range(1, repeats):
             if time.monotonic() < until:
                 report(f"speeds, process {repeat + 1} of {repeats}")
-                with Worker(experiment) as fresh:
+                with closing(Worker(experiment)) as fresh:
                     done += _timed(fresh, plan, rows, repeat, until)
     return _dataset_of(experiment, plan, rows, references, done, time.monotonic() - begun)
 
@@ -469,7 +467,7 @@ def _explored(
                 return
             found[task] = answer
 
-    with ThreadPoolExecutor(1) as pool, Worker(experiment) as other:
+    with ThreadPoolExecutor(1) as pool, closing(Worker(experiment)) as other:
         beside = pool.submit(explore, other, references)
         explore(worker, tasks[:1])
         beside.result()
@@ -545,13 +543,11 @@ def _dataset_of(
     drifts = [{} if row.trial is None else row.trial.drifts for row in rows]
     names = sorted({name for one in drifts for name in one})
     error = np.full((len(rows), len(plan.times)), np.nan)
-    columns: dict[str, list[float]] = {name: [math.nan] * len(rows) for name in _NUMBERS}
+    numbers = np.full((len(_NUMBERS), len(rows)), np.nan)
     for n, row in enumerate(rows):
         if row.status in (RowStatus.MEASURED, RowStatus.SHORT):
-            errors, values = row.measured(rows[0], plan.span)
+            errors, numbers[:, n] = row.measured(rows[0], plan.span)
             error[n, : len(errors)] = errors
-            for name, value in zip(_NUMBERS, values, strict=True):
-                columns[name][n] = float(value)
 
     def words(values: Iterable[object]) -> np.ndarray:
         return np.array([str(value) for value in values], dtype=object)
@@ -572,7 +568,7 @@ def _dataset_of(
             "status": variable(words(r.status.value for r in rows), "1", "what became of the setting"),
             "reason": variable(words(r.problem for r in rows), "1", "why it was not measured"),
             "attitude_error": variable(error, "rad", "attitude error", ("setting", "time")),
-            **{name: variable(columns[name], *said) for name, said in _NUMBERS.items()},
+            **{name: variable(numbers[k], *said) for k, (name, said) in enumerate(_NUMBERS.items())},
             "drift": variable(drift, "1", "largest relative drift of the invariant", across),
         },
         coords={

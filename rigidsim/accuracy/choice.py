@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING
@@ -67,8 +67,6 @@ from rigidsim.scene.schema import LARGEST_DIGITS
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.problem import InitialValueProblem, prepare, prepare_scene
-from rigidsim.solve.sampling import SampleClock
-from rigidsim.solve.stepper import Stepper
 
 if TYPE_CHECKING:
     import xarray
@@ -95,29 +93,25 @@ class Pilot:
 
 
 def run_pilot(
-    stepper: Stepper,
-    clock: SampleClock,
-    skip: Callable[[int], bool] | None = None,
+    prepared: InitialValueProblem,
+    corrected: CorrectedStepper,
     *,
     steps: int = PILOT_STEPS,
     seconds: float = math.inf,
     chunk: int = 64,
     largest_chunk: int = 64,
-    warming: int = 0,
 ) -> Pilot:
     """Take the first steps of a motion, chunk by chunk, each twice as long up to the largest; ``steps`` are
-    the most, give or take a chunk, and none come after the last sample. ``skip`` takes steps with what is
-    done between.
+    the most, give or take a chunk, and none come after the last sample. Those taken before aren't timed.
     """
+    stepper, clock = corrected.stepper, prepared.clock
     # past the last of its pieces a motion may be one in which nothing happens, with steps of any length
-    near_end = skip is not None and stepper.system.pieces is not None
-    chunk, skip = 1 if near_end else chunk, skip or stepper.take
+    near_end = stepper.system.pieces is not None
     begin, end = float(clock.start), float(clock.at(clock.count - 1))
-    going = not warming or skip(warming)
-    warm, spent = stepper.steps, 0.0
+    warm, spent, going, chunk = stepper.steps, 0.0, True, 1 if near_end else chunk
     while going:
         started = time.process_time()
-        going = skip(chunk) and stepper.largest > 0
+        going = corrected.skip(chunk) and stepper.largest > 0
         spent += time.process_time() - started
         going = going and spent < seconds and stepper.steps < steps and float(stepper.time) < end
         chunk = min(2 * chunk, largest_chunk)
@@ -179,7 +173,7 @@ def motion_of(experiment: Experiment, *, loads: Sequence[Load] = ()) -> KnownMot
     scene = trial_scene(experiment, Setting())
     prepared = compactly(prepare_scene(experiment, scene, loads=loads))
     corrected = assemble(prepared).steps()
-    pilot = run_pilot(corrected.stepper, prepared.clock, corrected.skip)
+    pilot = run_pilot(prepared, corrected)
     form, _ = closed_form_if_any(scene, driven=bool(loads))
     return KnownMotion(
         steps=pilot.whole,

@@ -10,7 +10,6 @@ than the windows is followed to its end instead. The errors of the integration i
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
@@ -54,47 +53,41 @@ _TOLERANCE = 1e-9  # far below what matters of an error's growth
 _STANDS = 1e-13  # rad: a path that is shorter has no direction
 
 
-@dataclass(frozen=True)
-class _Carrying:
-    """How an averaged motion carries small errors of its direction on: steadily, in proportion to time, or
-    exponentially, as near a hyperbolic Cassini state. Tangent maps (stretches, 2, 2) of the direction, in
-    components along the path and across it, whose products are those between any two times. The average over
-    the orbits serves where there is one, whose steps are few whatever the run's level; it carries errors
-    alike, up to terms that averaging leaves out.
+def _grown_along(seconds: float, maps: np.ndarray, along: float, across: float) -> float:
+    """Largest error (rad) until the end, of a motion that errs by given rates (rad/s) along the path and
+    across it all the time, through stretches of some seconds whose maps carry small errors on: what is made
+    at different times adds up whatever its sign, which need not stay the same.
     """
-
-    seconds: float
-    maps: np.ndarray
-
-    def grown(self, along: float, across: float) -> float:
-        """Largest error (rad) until the end, of a motion that errs by given rates (rad/s) along the path and
-        across it all the time: what is made at different times adds up whatever its sign, which need not stay
-        the same.
-        """
-        made, largest = np.diag([along, across]) * self.seconds / 2, 0.0
-        errors = np.zeros((2, 0))  # a column for each time and component
-        for step in self.maps:
-            # half of a stretch's errors at its beginning, half at its end
-            errors = np.hstack([step @ errors, step @ made + made])
-            largest = max(largest, math.hypot(*np.abs(errors).sum(axis=1)))
-            if largest > math.pi:
-                break
-        return largest
+    made, largest = np.diag([along, across]) * seconds / 2, 0.0
+    errors = np.zeros((2, 0))  # a column for each time and component
+    for step in maps:
+        # half of a stretch's errors at its beginning, half at its end
+        errors = np.hstack([step @ errors, step @ made + made])
+        largest = max(largest, math.hypot(*np.abs(errors).sum(axis=1)))
+        if largest > math.pi:
+            break
+    return largest
 
 
 def _carrying(
-    prepared: InitialValueProblem, average: Average | None, go_on: Callable[[], bool] = lambda: True
-) -> _Carrying:
-    """Tangent maps of a run's averaged motion, from its start to its end; of a run of the full model (None),
-    of its average over the orbits. Raises ``ConfigError`` where there is none, and ``Unmeasured`` if
-    ``go_on`` ended it, or the motion can't be followed.
+    prepared: InitialValueProblem, average: Average, go_on: Callable[[], bool]
+) -> tuple[float, np.ndarray]:
+    """How an averaged motion carries small errors of its direction on, from its start to its end: steadily,
+    in proportion to time, or exponentially, as near a hyperbolic Cassini state. Length of a stretch, s, and
+    maps (stretches, 2, 2) of the direction, in components along the path and across it, whose products are
+    the maps between any two times. Raises ``Unmeasured`` if ``go_on`` ended it, or it can't be followed.
+
+    The average over the orbits serves where there is one, whose steps are few whatever the run's level; it
+    carries errors alike, up to terms that averaging leaves out.
     """
-    problem = _problem(prepared, average)
+    scene, names, orbits = prepared.scene, ["momentum_axis"], average if average.over_orbits else None
+    try:
+        problem = in_model(prepared, scene, names, ORBIT_AVERAGED, orbits)
+    except ConfigError:
+        problem = in_model(prepared, scene, names, average.level, average)
     system = problem.system
+    assert system.formulation.average is not None
     average = system.formulation.average
-    assert average is not None
-    if average.resonance is not None:
-        raise Unmeasured(UnmeasuredCode.AVERAGED_STOPPED, "a resonance is no motion of a direction alone")
     start, end = float(problem.clock.start), float(problem.clock.at(problem.clock.count - 1))
     seconds = math.ldexp(end - start, system.scaling.time)
     turned = seconds * average.strength * abs(float(average.motion.excess / average.motion.momentum))
@@ -130,17 +123,7 @@ def _carrying(
         moved.append((mixed @ grown[:, own]).T)
         bases.append(_basis(state[places], np.zeros(3), path[0]))
     maps = [after @ step for after, step in zip(bases[1:], moved, strict=True)]
-    return _Carrying(seconds / count, np.array(maps))
-
-
-def _problem(prepared: InitialValueProblem, average: Average | None) -> InitialValueProblem:
-    """The averaged motion that is followed: averaged over the orbits as well, if it can be."""
-    scene, names = prepared.scene, ["momentum_axis"]
-    if average is None or average.over_orbits:
-        return in_model(prepared, scene, names, ORBIT_AVERAGED, average)
-    with suppress(ConfigError):
-        return in_model(prepared, scene, names, ORBIT_AVERAGED, None)
-    return in_model(prepared, scene, names, average.level, average)
+    return seconds / count, np.array(maps)
 
 
 def _basis(direction: np.ndarray, towards: np.ndarray, otherwise: np.ndarray | None = None) -> np.ndarray:
@@ -553,7 +536,7 @@ def _extrapolated(
     windows: list[Window],
     motions: Sequence[FreeMotion],
     span: float,
-    carried: _Carrying | None,
+    carried: tuple[float, np.ndarray] | None,
 ) -> tuple[float, float]:
     """How far the momentum's direction is off at the end, from its growth in windows, and its oscillation."""
     doubts, faster = [w.kept.doubt for w in windows], 0.0
@@ -574,7 +557,7 @@ def _extrapolated(
         shear = float(average.shear(prepared.scene.context, prepared.scene.start))
         grown = math.hypot(along + faster + shear * across * span / 2, across) * span
     else:
-        grown = carried.grown(along + faster, across)
+        grown = _grown_along(*carried, along + faster, across)
     oscillation = max(w.recorded for w in windows)
     if average.driven is not None:  # resonances between the windows
         oscillation += average.driven.passed

@@ -95,9 +95,8 @@ def compared_levels(
 def timed_pilot(prepared: InitialValueProblem, corrected: CorrectedStepper, seconds: float) -> Pilot:
     """The first steps of a motion, corrections included, within so many CPU seconds."""
     return run_pilot(
-        corrected.stepper,
-        prepared.clock,
-        corrected.skip,
+        prepared,
+        corrected,
         seconds=seconds,
         chunk=1,
         largest_chunk=_LARGEST_CHUNK,
