@@ -122,6 +122,11 @@ def moves(values: Array) -> bool:
     return bool(len(finite) and np.ptp(finite) > _STILL * np.abs(finite).max())
 
 
+def crossings(column: Array) -> int:
+    """How often a curve passes its mean."""
+    return int(np.count_nonzero(np.diff(np.signbit(column - np.nanmean(column)))))
+
+
 def uncertain(dataset: xarray.Dataset, values: Array, divisor: float) -> Array | None:
     """The announced attitude error of angles, growing like t^1.5 to that at the end, if it can be seen."""
     error, finite = dataset.attrs.get("attitude_error"), values[np.isfinite(values)]
@@ -407,9 +412,8 @@ def latitude_libration(dataset: xarray.Dataset) -> Found:
 
 def loop_rows(swing: Array) -> int:
     """Rows in some loops of a path that goes to and fro; 0 if it has few loops."""
-    about = swing - np.mean(swing)
-    crossings = int(np.count_nonzero(about[1:] * about[:-1] < 0))
-    return round(2 * _LOOPS * len(swing) / crossings) if crossings > 8 * _LOOPS else 0
+    passes = crossings(swing)
+    return round(2 * _LOOPS * len(swing) / passes) if passes > 8 * _LOOPS else 0
 
 
 def pointing(dataset: xarray.Dataset) -> Found:

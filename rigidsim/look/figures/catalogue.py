@@ -25,7 +25,7 @@ from matplotlib.gridspec import SubplotSpec
 from matplotlib.text import Text
 
 from rigidsim.look import curves, paths, signals, sources
-from rigidsim.look.curves import CURVES, HUES, STATES, Plot, moves, paper, screen
+from rigidsim.look.curves import CURVES, HUES, STATES, Plot, crossings, moves, paper, screen
 from rigidsim.look.figure_names import FIGURES, OVERVIEW, SPECTRUM
 from rigidsim.look.figures import style, surfaces
 from rigidsim.look.figures.style import GREY, INK, PALE, START, STYLE, Z, blank, curve, key, square, titled
@@ -34,7 +34,6 @@ from rigidsim.look.paths import PATHS
 from rigidsim.look.paths import Path as PlanePath
 from rigidsim.look.record import scene_of
 from rigidsim.look.signals import clock, need, optional
-from rigidsim.look.solids import Array
 from rigidsim.look.thinning import thin
 from rigidsim.scene.parts_of_values import in_time_order
 from rigidsim.scene.readable import scaled, span_text, unit_for, with_unit
@@ -90,7 +89,7 @@ def _plot(axes: Axes, dataset: xarray.Dataset, plot: Plot, *, dense: bool) -> No
         color = paper(hue)
         if plot.log:
             axes.plot(time, np.where(column > 0, column, np.nan), color=color, label=label, lw=0.9)
-        elif dense and len(time) >= 4 * _BANDS and _crossings(column) > 2 * MANY:
+        elif dense and len(time) >= 4 * _BANDS and crossings(column) > 2 * MANY:
             parts = np.arange(0, len(time), len(time) // _BANDS)
             low, high = np.fmin.reduceat(column, parts), np.fmax.reduceat(column, parts)
             at = np.append(time[parts[:-1]], time[-1])
@@ -114,11 +113,6 @@ def _plot(axes: Axes, dataset: xarray.Dataset, plot: Plot, *, dense: bool) -> No
         axes.set_ylim(0.0, 1.1 * axes.get_ylim()[1])
     key(axes, plot.title + (" (grey: what rounding explains)" if plot.band else ""))
     axes.set_ylabel(with_unit(plot.word, plot.unit))
-
-
-def _crossings(column: Array) -> int:
-    """How often a curve passes its mean."""
-    return int(np.count_nonzero(np.diff(np.signbit(column - np.nanmean(column)))))
 
 
 def _path(axes: Axes, path: PlanePath) -> None:
@@ -233,7 +227,7 @@ class Shown:
         for column in () if begun is None else begun.values.T:
             values = column[np.isfinite(column)]
             if len(values) >= 50 and moves(values):
-                changes = _crossings(values)
+                changes = crossings(values)
                 if changes < _TELLING * len(values):  # else too sparse to separate swings from a pattern
                     most = max(most, changes)
                 away = np.abs(values - np.median(values)) > _SETTLED * np.ptp(values)

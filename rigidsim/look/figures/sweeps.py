@@ -7,6 +7,7 @@ axes than two, the others are cut at their first value, and the page says so.
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -204,9 +205,8 @@ def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
         labels = dataset[dim].values if dim in dataset.coords else range(variable.sizes[dim])
         variable = variable.assign_coords({dim: [_text(label) for label in labels]})
     if any(str(dim).endswith(_SECTION) for dim in variable.dims):
-        return _points(
-            dataset, variable, [axis for dim in variable.dims for axis in longest if axis.dim == dim]
-        )
+        members = [axis for dim in variable.dims for axis in longest if axis.dim == dim]
+        return _drawn(dataset, _points, (8.4, 6.0), variable, members)
     kept = [axis for axis in longest[:2] if len(axis.place) > 1] or longest[:1]
     said = [axis.texts[0] for axis in longest if axis not in kept]
     variable = variable.isel({axis.dim: 0 for axis in longest if axis not in kept})
@@ -223,16 +223,26 @@ def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
         said += [f"{dim.replace('_', ' ')} {variable[dim].item()}" for dim in extra]
     title = "; ".join([_title(variable), *([", ".join(said)] if said else [])])
     if len(kept) == 1 and kept[0].directions is not None:
-        return _sphere(dataset, variable, kept[0].directions, title)
+        ground: dict[str, Any] = {"projection": "mollweide", "facecolor": PALE}
+        return _drawn(dataset, _sphere, (8.4, 4.8), variable, kept[0].directions, title, **ground)
     if lines:
-        return _lines(dataset, variable, kept, title)
-    return _map(dataset, variable, sorted(kept, key=lambda axis: variable.dims.index(axis.dim)), title)
+        return _drawn(dataset, _lines, (9.0, 4.4), variable, kept, title)
+    kept = sorted(kept, key=lambda axis: variable.dims.index(axis.dim))
+    return _drawn(dataset, _map, (8.4, 6.0), variable, kept, title, facecolor=PALE)
 
 
-def _lines(dataset: xarray.Dataset, variable: xarray.DataArray, kept: list[Axis], title: str) -> Figure:
+def _drawn(
+    dataset: xarray.Dataset, draw: Callable[..., None], size: tuple[float, float], *what: Any, **options: Any
+) -> Figure:
+    """A page with one panel, which a function draws."""
+    figure = blank(dataset, *size)
+    draw(figure.add_subplot(**options), *what)
+    return figure
+
+
+def _lines(axes: Axes, variable: xarray.DataArray, kept: list[Axis], title: str) -> None:
     """Values over one axis, with a line for each component, or value of another axis."""
-    figure, (axis, *others) = blank(dataset, 9.0, 4.4), kept
-    axes = figure.add_subplot()
+    axis, *others = kept
     rest = [dim for dim in variable.dims if dim != axis.dim]
     texts = {dim: variable[dim].values for dim in rest} | {other.dim: other.texts for other in others}
     labels = [" ".join(parts) for parts in product(*(texts[dim] for dim in rest))]
@@ -247,13 +257,10 @@ def _lines(dataset: xarray.Dataset, variable: xarray.DataArray, kept: list[Axis]
     axis.show(axes)
     axes.set(ylabel=_named(variable), **({"yscale": "log"} if spans_decades(table) else {}))
     axes.yaxis.set_offset_position("right")  # the key is on the left
-    return figure
 
 
-def _map(dataset: xarray.Dataset, variable: xarray.DataArray, kept: list[Axis], title: str) -> Figure:
+def _map(axes: Axes, variable: xarray.DataArray, kept: list[Axis], title: str) -> None:
     """Values over two axes, as colours."""
-    figure = blank(dataset, 8.4, 6.0)
-    axes = figure.add_subplot(facecolor=PALE)
     for axis, which in zip(kept, "xy", strict=True):
         variable = variable.assign_coords({axis.dim: axis.place}).sortby(axis.dim)
         axis.show(axes, which)
@@ -263,7 +270,6 @@ def _map(dataset: xarray.Dataset, variable: xarray.DataArray, kept: list[Axis], 
     variable.plot.pcolormesh(x=kept[0].dim, y=kept[1].dim, ax=axes, **options, **_colours(variable.values))
     axes.grid(visible=False)
     titled(axes, title + missing)
-    return figure
 
 
 def _colours(values: Array) -> dict[str, Any]:
@@ -280,11 +286,10 @@ def _colours(values: Array) -> dict[str, Any]:
     return {"cmap": "viridis", "norm": norm, "extend": ("neither", "min", "max", "both")[beyond]}
 
 
-def _sphere(dataset: xarray.Dataset, variable: xarray.DataArray, ways: Array, title: str) -> Figure:
+def _sphere(axes: Axes, variable: xarray.DataArray, ways: Array, title: str) -> None:
     """A Mollweide map, +z at the top and +x in the centre, with a dot for each direction, (members, 3)."""
-    figure, scale = blank(dataset, 8.4, 4.8), _colours(np.asarray(variable.values, dtype=np.float64))
+    figure, scale = axes.figure, _colours(np.asarray(variable.values, dtype=np.float64))
     extend = scale.pop("extend")
-    axes = figure.add_subplot(projection="mollweide", facecolor=PALE)
     longitude, latitude = np.arctan2(ways[:, 1], ways[:, 0]), np.arcsin(np.clip(ways[:, 2], -1, 1))
     figure.canvas.draw()  # the layout says how large the map is
     box = axes.get_window_extent()
@@ -298,10 +303,9 @@ def _sphere(dataset: xarray.Dataset, variable: xarray.DataArray, ways: Array, ti
     axes.grid(visible=False)
     titled(axes, title)
     figure.colorbar(dots, ax=axes, label=_named(variable), shrink=0.7, extend=extend, **_BAR)
-    return figure
 
 
-def _points(dataset: xarray.Dataset, variable: xarray.DataArray, members: list[Axis]) -> Figure:
+def _points(axes: Axes, variable: xarray.DataArray, members: list[Axis]) -> None:
     """A section's points of all members: one component against the other, or the axis of the members."""
     dims = [axis.dim for axis in members]
     (occurrence,) = [dim for dim in variable.dims if str(dim).endswith(_SECTION)]
@@ -311,8 +315,6 @@ def _points(dataset: xarray.Dataset, variable: xarray.DataArray, members: list[A
     stride = max(1, -(-table[..., 0].size // _MOST_POINTS))
     rows = table.reshape(-1, table.shape[2])[::stride]
     which = np.repeat(np.arange(len(table)), table.shape[1])[::stride]
-    figure = blank(dataset, 8.4, 6.0)
-    axes = figure.add_subplot()
     if rows.shape[1] > 1:
         # the first two components that vary: what the section is cut at doesn't, but for rounding
         known = rows[np.isfinite(rows).all(axis=1)]
@@ -328,7 +330,6 @@ def _points(dataset: xarray.Dataset, variable: xarray.DataArray, members: list[A
     axes.scatter(x, y, c=which if rows.shape[1] > 1 else GREY, s=2.5, lw=0, rasterized=True)
     axes.set(xlabel=across, ylabel=up)
     titled(axes, _title(variable) + ("; coloured by member" if rows.shape[1] > 1 else ""))
-    return figure
 
 
 def _title(variable: xarray.DataArray) -> str:
