@@ -414,6 +414,10 @@ class PlacedInPlane(Placement):
             return table_plane(self.reference.table)
         return kepler_plane(required(self.reference.orbit))
 
+    def node_factor(self, context: Any) -> Any:
+        """(3 cos^2 i - 1) / 2, of the mean of n n^T over the node along the plane's normal."""
+        return 1 - 3 * context.sin(self.inclination) ** 2 / 2
+
     def distance(self, context: Any) -> Any:
         return self.semi_major_axis
 

@@ -464,6 +464,7 @@ def summarise(run: "_ActiveRun", found: Diagnostics, spectrum: LyapunovSpectrum 
         accuracy=_accuracy(found),
         modelling=_modelling(found),
         tables=_tables(found),
+        **({} if (tides := _tides(found)) is None else {"tides": tides}),
         lyapunov=_lyapunov(found, spectrum),
         **understood(prepared, sizes=False),
         bit_for_bit=_bit_for_bit(prepared, progress, run.attributes.get("mixed_provenance")),
@@ -528,6 +529,16 @@ def _accuracy(found: Diagnostics) -> Accuracy:
         examined_share=estimate.share,
         amplification_how="of the estimated error over a stable motion's, whose rounding errors grow "
         "as (eps/2) sqrt(steps) sqrt(4 + (|w| t)^2 / 3), and what the tolerance cuts off; 1 for a stable one",
+    )
+
+
+def _tides(found: Diagnostics) -> str | None:
+    prepared = found.prepared
+    average = prepared.system.formulation.average
+    return (
+        None
+        if average is None
+        else average.tidal_words(prepared.scene, float(prepared.scene.end - prepared.scene.start))
     )
 
 

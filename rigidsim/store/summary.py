@@ -393,6 +393,7 @@ class Summary(Brief, Understood):
         engine_time: time that the integration reached, s; its own steps go past the last sample.
         unwatched: invariants of the scene that weren't monitored, and why.
         advice: settings that would do better at about the same cost, the best last.
+        tides: the tidal model, and what the other one would change.
         undefined_samples: number of NaN samples of each recorded variable that has any.
         dataset_sha256, timeline_sha256: SHA-256 of the files, once there are any.
     """
@@ -414,6 +415,7 @@ class Summary(Brief, Understood):
     accuracy: Accuracy
     modelling: Modelling | None = None
     tables: dict[Text, TableErrors] = Field(default_factory=dict)
+    tides: Text | None = None
     lyapunov: Lyapunov | None = None
     bit_for_bit: BitForBit
     provenance: dict[Text, StrictStr | StrictInt]

@@ -261,6 +261,8 @@ def _print_found(summary: Summary, on: Page, verbose: bool) -> None:
     if summary.undefined_samples:
         lost = [f"{name} at {n:,} sample{'s' * (n > 1)}" for name, n in summary.undefined_samples.items()]
         on.line("missing", f"{', '.join(lost)}: undefined there, NaN is recorded")
+    if summary.tides is not None:
+        on.line("tides", summary.tides)
     on.lines("advice", filter(None, map(advice_line, summary.advice)), "cyan")
     for name, found in summary.tables.items() if verbose else ():
         on.line(

@@ -58,7 +58,7 @@ from rigidsim.model.averaged.free_motion import (
 )
 from rigidsim.model.averaged.resonance import Resonance, SlowStart
 from rigidsim.model.averaged.sources import Source, nutation, sources_of, unit
-from rigidsim.model.averaged.tides import Tides, tides_of
+from rigidsim.model.averaged.tides import Tides, described, tides_of
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Carrier, Mechanics, carried_beside
 from rigidsim.model.orbits import Carried
@@ -851,6 +851,19 @@ class Average:
     def rate(self, source: Source) -> Any:
         """Precession constant k = 3 (G M / a^3) excess / L (mpf, 1/s) of a source; see ``orbit_terms``."""
         return source.strength * self.motion.excess / self.motion.momentum
+
+    def tidal_words(self, scene: Scene, seconds: float) -> str | None:
+        """The tidal model, and what the other would change within so many seconds; None without tides."""
+        on_orbit = [source for source in self.sources if source.has_elements]
+        if self.tides is None or not on_orbit:
+            return None
+        context, rates = scene.context, dict[int, float]()
+        for source in self.sources:
+            placed, e = source.of.placement, source.eccentricity
+            node = float(placed.node_factor(context)) if isinstance(placed, PlacedInPlane) else 1.0
+            rates[source.number] = float(self.rate(source)) / 2 * (1 - e * e) ** -1.5 * node
+        cosine = float(dot(on_orbit[0].normal(context, scene.start), self.start))
+        return described(self.tides, rates, cosine, seconds)
 
     @property
     def strength(self) -> float:

@@ -19,7 +19,7 @@ D is ``dissipation``. Orbits are taken as circles.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -184,7 +184,29 @@ def tides_of(scene: Scene, sources: Sequence[Source], momentum: Any) -> Tides | 
     return Tides(table, spin, found, scene.start, context)
 
 
-def histories(tides: Tides, linear: bool, cosine: float, seconds: np.ndarray) -> np.ndarray:
+def described(tides: Tides, rates: Mapping[int, float], cosine: float, seconds: float) -> str:
+    """The tidal model, and what the other one would change of the precession until the end, for a summary.
+
+    Args:
+        rates: of precession by each source at the start, by number of its load, rad/s.
+        cosine: x at the start, taken as constant.
+        seconds: from start to end, with its sign.
+    """
+    times = np.linspace(0.0, seconds, _STEPS)
+    growths = []
+    for linear in (tides.linear, not tides.linear):
+        spin, *distances = _histories(tides, cosine, times, linear=linear)
+        far = {one.source.number: r for one, r in zip(tides.raising, distances, strict=True)}
+        growths.append(sum(rate * spin * far.get(n, spin * 0 + 1) ** -3 for n, rate in rates.items()))
+    shift = float(np.trapezoid(growths[1] - growths[0], times)) * cosine
+    names = (LINEAR, "constant_lag") if tides.linear else ("constant_lag", LINEAR)
+    return (
+        f"model {names[0]}; {names[1]} would change the precession by about {abs(np.degrees(shift)):.3g} deg at "
+        "the end"
+    )
+
+
+def _histories(tides: Tides, cosine: float, seconds: np.ndarray, *, linear: bool) -> np.ndarray:
     """w, and r of each raising source, (1 + sources, n), by either model at even times from the start in s,
     for a constant x, in double precision by the classical Runge-Kutta method.
     """

@@ -202,8 +202,8 @@ class AveragedMechanics(Mechanics):
         rate, growth = self.average.rate(source) * self.unit, None
         if self.average.tides is not None:
             growth = self.average.tides.growth(self, source)
-        if isinstance(placed, PlacedInPlane):  # <n n^T> over the node
-            rate = rate * (1 - 3 * self.scene.context.sin(placed.inclination) ** 2 / 2)
+        if isinstance(placed, PlacedInPlane):
+            rate = rate * placed.node_factor(self.scene.context)
         return self._terms(source).secular(rate, self.direction, second=self._second, growth=growth)
 
     def normal(self, source: Source) -> list[Symbolic]:
