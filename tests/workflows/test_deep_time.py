@@ -232,7 +232,9 @@ def test_tides_are_those_of_the_literature(
     config: Path, model: str, raised: list[str], dissipation: float
 ) -> None:
     config.write_text(with_moon(config, model, raised, dissipation))
-    data = loaded(rigidsim.run(config, out=None))
+    run = rigidsim.run(config, out=None)
+    data = loaded(run)
+    assert f"model {model}; " in run.summary["tides"]
     known = tidal_truth(data.time.values / YEAR, model, raised, dissipation)
     np.testing.assert_allclose(data.momentum_axis, known["axis"], rtol=0, atol=2e-10)
     np.testing.assert_allclose(2 * np.pi / SPIN / data.rotation_period, known["w"], rtol=1e-10)
@@ -244,6 +246,10 @@ def test_tides_are_those_of_the_literature(
 REFUSED: dict[str, tuple[object, str]] = {
     "model.order": (2, "with order = 1, no short_period"),
     "tides.raised_by": (["mon"], 'given "mon"; did you mean "moon"?'),
+    "tides": (
+        {"raised_by": ["moon", "sun"]},
+        'given 2 names, where "linear" has the rates of the Moon alone',
+    ),
     "loads[1].orbit.plane_of": ("sum", 'given "sum"; did you mean "sun"?'),
     "model.start": ("osculating", 'order = 1 and start = "mean"'),
     "initial.angular_velocity": ([0, 0, 1e-5], "for a body that turns at 1e-05 rad/s"),

@@ -165,6 +165,8 @@ def tides_of(scene: Scene, sources: Sequence[Source], momentum: Any) -> Tides | 
     earth = abs(float(spin) / _EARTH_RATE - 1) < _EARTH_WITHIN
     what = f'given "linear", whose rates are the Earth\'s, for a body that turns at {float(spin):.4g} rad/s; '
     ensure(earth or table.model != LINEAR, fault("model", what + 'choose "constant_lag"'))
+    what = f'given {len(table.raised_by)} names, where "linear" has the rates of the Moon alone; name one'
+    ensure(table.model != LINEAR or len(table.raised_by) == 1, fault("raised_by", what))
     given = earth or (table.radius is not None and table.love_lag is not None)
     ensure(given, fault("", 'model = "constant_lag" needs radius and love_lag (k2 times the lag); give both'))
     ensure(body.mass is not None, fault("", "tides need the body's mass; give [body] mass"))
@@ -200,10 +202,8 @@ def described(tides: Tides, rates: Mapping[int, float], cosine: float, seconds: 
         growths.append(sum(rate * spin * far.get(n, spin * 0 + 1) ** -3 for n, rate in rates.items()))
     shift = float(np.trapezoid(growths[1] - growths[0], times)) * cosine
     names = (LINEAR, "constant_lag") if tides.linear else ("constant_lag", LINEAR)
-    return (
-        f"model {names[0]}; {names[1]} would change the precession by about {abs(np.degrees(shift)):.3g} deg at "
-        "the end"
-    )
+    turned = f"{abs(np.degrees(shift)):.3g} deg at the end"
+    return f"model {names[0]}; {names[1]} would change the precession by about {turned}"
 
 
 def _histories(tides: Tides, cosine: float, seconds: np.ndarray, *, linear: bool) -> np.ndarray:
@@ -212,7 +212,9 @@ def _histories(tides: Tides, cosine: float, seconds: np.ndarray, *, linear: bool
     """
     if linear:
         spin, cubed, _ = map(float, tides.slopes)
-        return np.array([1 + spin * seconds, *((1 + cubed * seconds) ** (-1 / 3) for _ in tides.raising)])
+        moon = max(tides.raising, key=lambda one: float(one.rate))
+        shares = [cubed if one is moon else 0.0 for one in tides.raising]
+        return np.array([1 + spin * seconds, *((1 + share * seconds) ** (-1 / 3) for share in shares)])
     sizes = [(one.rate, one.motion / tides.spin, one.recession) for one in tides.raising]
     k, orbit, away = np.array(sizes, dtype=float).T
 
