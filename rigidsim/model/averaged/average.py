@@ -52,9 +52,11 @@ from rigidsim.model.averaged.free_motion import (
     Polhodes,
     Separatrix,
     Wobble,
+    along_polhode,
     free_motion,
     mean_square_sine,
     means_needed,
+    parameter_of,
 )
 from rigidsim.model.averaged.resonance import Resonance, SlowStart
 from rigidsim.model.averaged.sources import Source, nutation, sources_of, unit
@@ -411,7 +413,7 @@ class DrivingTorques:
             return 0
         count, around = _FEWEST_NODES, 2 * np.pi * np.arange(_NODES) / _NODES
         # of what is averaged: a mean may vanish
-        scale = max(float(np.abs(self.change(p, q, around)).max()) for p, q in amplitudes)
+        scale = max(float(np.abs(self.change(p, q, around)[0]).max()) for p, q in amplitudes)
         while count <= _MOST_NODES:
             pairs = [(self.mean(p, q, count), self.mean(p, q, 2 * count)) for p, q in amplitudes]
             if all(float(np.abs(x - y).max()) <= _CHECKED * scale for x, y in pairs):
@@ -426,37 +428,25 @@ class DrivingTorques:
 
     def parameter_at(self, amplitudes: np.ndarray) -> float:
         """k^2 at amplitudes P and Q."""
-        ratio = float(self.polhodes.ratio)
-        return 0.0 if ratio == 1 else float((1 - ratio) * (amplitudes[1] / amplitudes[0]) ** 2)
+        return parameter_of(float(self.polhodes.ratio), float(amplitudes[0]), float(amplitudes[1]))
 
     def across(self, wobble: Wobble) -> np.ndarray:
         """Torque across the momentum, x + i y in the frame that precesses, (points,)."""
         turned = np.einsum("nab,bn->an", wobble.turns, self.at(wobble.momentum))
         return np.asarray(turned[0] + 1j * turned[1])
 
-    def change(self, axial: float, transverse: float, angle: np.ndarray) -> np.ndarray:
-        """P' and Q', (2, n), at amplitudes f, per internal unit of time."""
+    def change(self, axial: float, transverse: float, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """P' and Q', (2, n), at amplitudes f, per internal unit of time, and dn, (n,)."""
         ratio, root = float(self.polhodes.ratio), float(self.polhodes.root)
-        cosine, sine = np.cos(angle), np.sin(angle)
-        share = (1 - ratio) * transverse / axial if ratio != 1 else 0.0
-        delta = np.sqrt(1 - share * (transverse / axial) * sine**2) if ratio != 1 else np.ones_like(sine)
-        momentum = np.array([root * transverse * cosine, transverse * sine, axial * delta])
-        torque = self.at(momentum)
-        along = torque[2] * delta + share * torque[1] * sine
-        return np.array([along, torque[0] * cosine / root + torque[1] * sine])
+        momentum, delta = along_polhode(ratio, axial, transverse, angle)
+        torque, share = self.at(momentum), (1 - ratio) * transverse / axial if ratio != 1 else 0.0
+        along = torque[2] * delta + share * torque[1] * np.sin(angle)
+        return np.array([along, torque[0] * np.cos(angle) / root + torque[1] * np.sin(angle)]), delta
 
     def mean(self, axial: float, transverse: float, count: int) -> np.ndarray:
         """Means of P' and Q' over a polhode, (2,), by a sum over nodes."""
-        angle = 2 * np.pi * (np.arange(count) + 0.5) / count
-        weight = 1 / self.deltas(axial, transverse, angle)
-        return np.asarray(self.change(axial, transverse, angle) @ weight / weight.sum())
-
-    def deltas(self, axial: float, transverse: float, angle: np.ndarray) -> np.ndarray:
-        """dn at amplitudes f."""
-        ratio = float(self.polhodes.ratio)
-        if ratio == 1:
-            return np.ones_like(angle)
-        return np.asarray(np.sqrt(1 - (1 - ratio) * (transverse / axial) ** 2 * np.sin(angle) ** 2))
+        slopes, delta = self.change(axial, transverse, 2 * np.pi * (np.arange(count) + 0.5) / count)
+        return np.asarray(slopes @ (1 / delta) / (1 / delta).sum())
 
     # --- as expressions -------------------------------------------------------------------------------------
 
@@ -631,7 +621,7 @@ def driven_by(
     amplitude = math.atan2(float(second), float(first / polhodes.root)) if across != 0 else 0.0
     start = [float(context.ldexp(x, -exponent)) for x in (axial, across)]
     wobble = torques.wobble(start[0], start[1], amplitude)
-    change = torques.change(start[0], start[1], wobble.amplitudes)
+    change, _ = torques.change(start[0], start[1], wobble.amplitudes)
     removed = wobble.removed(change, 0, float(np.abs(change).max())).real
     direction = np.zeros(3)
     if np.isfinite(removed).all():  # what isn't is refused below

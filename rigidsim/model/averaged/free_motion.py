@@ -221,6 +221,20 @@ def means_needed(parameter: float, epsilon: float) -> int:
     return _MEANS
 
 
+def parameter_of(ratio: float, axial: float, transverse: float) -> float:
+    """k^2 at amplitudes P and Q."""
+    return (1 - ratio) * (transverse / axial) ** 2 if ratio != 1 else 0.0
+
+
+def along_polhode(
+    ratio: float, axial: float, transverse: float, angle: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Momentum along the principal axes, (3, n), and dn, (n,), at amplitudes f."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    delta = np.sqrt(1 - parameter_of(ratio, axial, transverse) * sine**2)
+    return np.array([math.sqrt(ratio) * transverse * cosine, transverse * sine, axial * delta]), delta
+
+
 # --- one turn of the wobble ---------------------------------------------------------------------------------
 
 _POINTS = 256
@@ -247,14 +261,13 @@ class Wobble:
         first, second, third = (float(x) for x in moments)
         ratio = first * (second - third) / (second * (first - third)) if first != second else 1.0
         self.moments, root = np.array([first, second, third]), math.sqrt(ratio)
-        self.parameter = (1 - ratio) * (transverse / axial) ** 2 if ratio != 1 else 0.0
+        self.parameter = parameter_of(ratio, axial, transverse)
         self.size = math.hypot(axial, root * transverse)
         means = _means(self.parameter)
         self._theta = _wobbled(amplitude, means)
         self.amplitudes = _amplitudes(self._theta + 2 * np.pi * np.arange(_POINTS) / _POINTS, means)
         cosine, sine, sign = np.cos(self.amplitudes), np.sin(self.amplitudes), math.copysign(1.0, transverse)
-        delta = np.sqrt(1 - self.parameter * sine**2)
-        self.momentum = np.array([root * transverse * cosine, transverse * sine, axial * delta])
+        self.momentum, _ = along_polhode(ratio, axial, transverse, self.amplitudes)
         # f' = pace dn, of which 1 / dn has the mean 2 K / pi
         wobble = axial * (third - second) / (root * second * third) * means[-1][0]
         squares = ratio * cosine**2, sine**2
