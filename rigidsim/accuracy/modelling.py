@@ -21,7 +21,7 @@ from rigidsim.accuracy.comparison import Collected, compactly
 from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.average import DIRECTION, Average, osculating
 from rigidsim.model.averaged.free_motion import FreeMotion, Wobble
-from rigidsim.model.averaged.resonance import SlowStart
+from rigidsim.model.averaged.sources import SlowStart
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import apply, cross, dot, norm
 from rigidsim.scene.choices import FULL, MEAN, ORBIT_AVERAGED

@@ -25,8 +25,7 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.euler_poles import angles_of_matrix, starts_near_pole
-from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.kinematics import Kinematics, angles_of_matrix, starts_near_pole
 from rigidsim.model.rotations import Symbolic, euler_from_matrix, quaternion_from_matrix
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.two_part import TwoPartTime, rounded

@@ -22,7 +22,7 @@ from collections.abc import Mapping
 
 import heyoka as hy
 
-from rigidsim.model.euler_poles import components_of_factor, starts_in_pole
+from rigidsim.model.kinematics import components_of_factor, starts_in_pole
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.names import written
 from rigidsim.model.rotations import Symbolic

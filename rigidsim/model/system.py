@@ -19,8 +19,8 @@ import heyoka as hy
 
 import rigidsim.model.observables.mechanical  # noqa: F401  (enters what it defines into the registry)
 from rigidsim.errors import ConfigError, Problem, ensure
-from rigidsim.model.euler_poles import Poles
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
+from rigidsim.model.kinematics import Poles
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.names import above_zero, carries_sign, plain_angles, written
 from rigidsim.model.observables.mechanical import WATCHED, WORK

@@ -6,7 +6,7 @@ turns by at most ``DENSE`` there: distant samples have rows between them, found 
 like samples but not recorded, and like samples they change no bit of the motion.
 
 Near a pole both outer Euler angles swing by up to half a turn at once, in opposite senses, while a + s c
-(``rigidsim.model.euler_poles``) advances no faster than the body turns. So its change gives the turns of c
+(``rigidsim.model.kinematics``) advances no faster than the body turns. So its change gives the turns of c
 once those of a are chosen; chosen one by one, they may add up to a turn that nobody made. Where an angle
 jumps by nearly half a turn all the same, the motion between the two rows is integrated once more, in double
 precision, and looked at in ever smaller parts. Of a pass nearer than that resolves the nearest way is taken.
@@ -22,8 +22,8 @@ from functools import cached_property
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.euler_poles import UNDEFINED
 from rigidsim.model.frames import plane_drift
+from rigidsim.model.kinematics import UNDEFINED
 from rigidsim.model.scaling import source_rate
 from rigidsim.model.system import Recorded, System
 from rigidsim.scene.rotations import AXES, is_proper, parity

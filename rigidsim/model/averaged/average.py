@@ -58,8 +58,7 @@ from rigidsim.model.averaged.free_motion import (
     means_needed,
     parameter_of,
 )
-from rigidsim.model.averaged.resonance import Resonance, SlowStart
-from rigidsim.model.averaged.sources import Source, nutation, sources_of, unit
+from rigidsim.model.averaged.sources import Resonance, SlowStart, Source, nutation, sources_of, unit
 from rigidsim.model.averaged.tides import Tides, described, tides_of
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Carrier, Mechanics, carried_beside

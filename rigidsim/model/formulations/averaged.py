@@ -4,7 +4,7 @@ space, but no rotation about them.
 Under torques of the body alone, the amplitudes P and Q of ``free_motion`` are states besides the momentum's
 direction. Gradients turn it as before, with the mean tensor of the present polhode.
 
-In spin-orbit resonance (see ``rigidsim.model.averaged.resonance``) with m the momentum along a, b, c,
+In spin-orbit resonance (see ``rigidsim.model.averaged.sources``) with m the momentum along a, b, c,
 w = I^-1 m, s = m / L, and W the rate of these axes, all along themselves,
 
     q' = q (0, W) / 2,    W = w - p n s + (s x Q - s x (s x dU/ds)) / L + G,
@@ -25,8 +25,7 @@ import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem, required
 from rigidsim.model.averaged.average import DIRECTION, Average, Driven, average_of
-from rigidsim.model.averaged.resonance import Resonance
-from rigidsim.model.averaged.sources import Ellipse, OrbitPlace, OrbitTerms, Source
+from rigidsim.model.averaged.sources import Ellipse, OrbitPlace, OrbitTerms, Resonance, Source
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Requirements
 from rigidsim.model.frames import refuse_without_plane
 from rigidsim.model.load import Load, Term

@@ -3,7 +3,15 @@
 One module per subject. Importing this package registers the observables in the order of the dataset.
 """
 
-from rigidsim.model.observables.axes import AXES, CLIMATE, POLE, ROTATION
+from rigidsim.model.observables.axes import (
+    AXES,
+    CLIMATE,
+    ORBIT,
+    POINT_MASSES,
+    POLE,
+    RESONANT_ANGLE,
+    ROTATION,
+)
 from rigidsim.model.observables.mechanical import MECHANICAL, PARTS, TOP, TOPS, WATCHED
 from rigidsim.model.observables.observable import (
     Angle as Angle,
@@ -23,7 +31,6 @@ from rigidsim.model.observables.observable import (
 from rigidsim.model.observables.observable import (
     register_all,
 )
-from rigidsim.model.observables.orbit import ORBIT, POINT_MASSES, RESONANT_ANGLE
 
 register_all(*MECHANICAL, *AXES, *ROTATION, *POLE, *ORBIT, *TOP, *POINT_MASSES, *PARTS, *CLIMATE)
 register_all(RESONANT_ANGLE, *TOPS, *WATCHED)

@@ -41,8 +41,8 @@ from typing import Any, NamedTuple
 
 import heyoka as hy
 
-from rigidsim.model.euler_poles import Poles, angles_of_matrix, squared_factor
 from rigidsim.model.frames import fixed_plane, jacobi_constant
+from rigidsim.model.kinematics import Poles, angles_of_matrix, squared_factor
 from rigidsim.model.load import Load
 from rigidsim.model.loads.changing_tensor import Elasticity
 from rigidsim.model.loads.gravity import Attraction

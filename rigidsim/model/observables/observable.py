@@ -13,7 +13,6 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.euler_poles import Poles
 from rigidsim.model.frames import (
     first_source,
     flies_about_source,
@@ -21,6 +20,7 @@ from rigidsim.model.frames import (
     reference_plane,
     rotating_orbit,
 )
+from rigidsim.model.kinematics import Poles
 from rigidsim.model.load import loads_of
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
@@ -171,7 +171,7 @@ def only_when_named(_: Mechanics) -> bool:
 class Angle:
     """atan2(across, along), an angle that may turn around: sine and cosine times a common size, of order 1.
 
-    Where that is below ``rigidsim.model.euler_poles.UNDEFINED`` rounding errors, NaN is recorded.
+    Where that is below ``rigidsim.model.kinematics.UNDEFINED`` rounding errors, NaN is recorded.
     """
 
     across: Symbolic
