@@ -54,18 +54,16 @@ class RecordedRotor:
 
 def rotors(dataset: xarray.Dataset) -> list[RecordedRotor]:
     """The rotors of a dataset whose rates were recorded, or are fixed."""
-    recorded = signals.values(dataset, "rotor_rate")
-    named = {} if recorded is None else dict(zip(dataset["rotor"].values.tolist(), recorded.T, strict=True))
-    found = []
-    for one in scene_of(dataset).rotors:
-        rate = named.get(one["name"])
-        if rate is None and one["drive"] == "fixed":
-            rate = np.full(dataset.sizes["time"], float(one["rate"]))
-        if rate is not None:
-            found.append(
-                RecordedRotor(one["name"], np.array(one["axis"]), float(one["moment"]), one["drive"], rate)
-            )
-    return found
+    recorded, listed = signals.values(dataset, "rotor_rate"), scene_of(dataset).rotors
+    count = dataset.sizes["time"]
+    rates = {one["name"]: np.full(count, float(one["rate"])) for one in listed if one["drive"] == "fixed"}
+    if recorded is not None:
+        rates |= zip(dataset["rotor"].values.tolist(), recorded.T, strict=True)
+    return [
+        RecordedRotor(name, np.array(one["axis"]), float(one["moment"]), one["drive"], rates[name])
+        for one in listed
+        if (name := one["name"]) in rates
+    ]
 
 
 def tensor(dataset: xarray.Dataset) -> Array | None:

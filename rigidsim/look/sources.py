@@ -71,10 +71,8 @@ def _name_of(one: dict[str, Any]) -> str:
 def point_masses(dataset: xarray.Dataset) -> list[Source]:
     """Point masses whose positions were recorded, if the body is one of them."""
     positions, host = signals.values(dataset, "point_mass_position"), scene_of(dataset).host
-    if positions is None or "point_mass" not in dataset["point_mass_position"].coords:
-        return []
-    names = [str(name) for name in dataset["point_mass_position"].coords["point_mass"].values]
-    if host not in names:
+    names = [str(name) for name in dataset.coords.get("point_mass", xarray.DataArray([])).values]
+    if positions is None or host not in names:
         return []
     own = positions[:, names.index(host)]
     others = [(k, name) for k, name in enumerate(names) if name != host]

@@ -80,7 +80,11 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None, for_slides: s
             own = "" if name == OVERVIEW else "_" + name.replace("[", "_").replace("]", "")
             own += "" if for_slides is None else "_slide"
             file = f"figure{own}.png"
-            usual = _in_folder_of(saved, file) if isinstance(saved, ShownRun) else saved.folder.path / file
+            usual = (
+                saved.folder.path / file
+                if isinstance(saved, SavedRun | SavedSweep)
+                else _in_folder_of(saved, file)
+            )
             target = usual if out is None else out / usual.name if several else out
             try:
                 kind = figure_format(target)
