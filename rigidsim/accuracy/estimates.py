@@ -35,7 +35,6 @@ from rigidsim.solve.effects.waypoints import SampleTrail, Waypoint, Waypoints
 from rigidsim.solve.error_tangents import (
     ErrorTangents,
     Held,
-    Known,
     LaneCarrier,
     Measures,
     Perturbations,
@@ -491,12 +490,16 @@ def _by_tangents(run: _Run) -> _Seen:
 
 def _tangents_of(run: _Run, start: float, end: float) -> ErrorTangents:
     prepared, system, precision = run.prepared, run.system, run.prepared.precision
-    measures, known, carrier = Measures(system), None, _stepped(run, start, end)
-    if carrier is None:
+    measures = Measures(system)
+    known: tuple[np.ndarray, np.ndarray] | None = None
+    carrier: LaneCarrier | SteppedCarrier
+    if system.switches or run.steps < _BY_ITSELF:  # code for all motions isn't known, or would cost more
+        carrier = _stepped(run, start, end)
+    else:
         carrier = LaneCarrier.of(system, _TOLERANCE, compact=run.steps * run.part < _UNROLLED)
         if run.regular and run.waypoints:
             states = np.array([one.state for one in run.waypoints])[:, :, None]
-            known = Known(np.ldexp([[one.time] for one in run.waypoints], run.shift), states)
+            known = np.ldexp([[one.time] for one in run.waypoints], run.shift), states
     units = [[math.ldexp(1.0, int(system.state_exponents[place]))] for place in measures.places["rates"]]
     starts = Starts(
         np.array([[float(x)] for x in system.initial]),
@@ -523,11 +526,9 @@ def _tangents_of(run: _Run, start: float, end: float) -> ErrorTangents:
     )
 
 
-def _stepped(run: _Run, start: float, end: float) -> SteppedCarrier | None:
-    """What follows the motion by separate steps; None where that costs more than code for all motions."""
+def _stepped(run: _Run, start: float, end: float) -> SteppedCarrier:
+    """What follows the motion by separate steps."""
     prepared, system = run.prepared, run.system
-    if not (system.switches or run.steps < _BY_ITSELF):
-        return None
     double = replace(precision_of("double"), compact=True)
     near = run.stepper if system is prepared.system else None
     near = own = near or stepper_of(system, double, None, double.scalar(start))
@@ -782,7 +783,7 @@ class MemberEstimates:
             block.states[:, : self._family.moving][rows][:, :, some],
         )
         unknown = ~np.isfinite(states).all(axis=1) | (rows[:, None] >= block.reached[some])
-        known = Known(np.where(unknown, np.nan, times), states)
+        known = np.where(unknown, np.nan, times), states
         tangents = ErrorTangents(
             carrier, self._measures, starts, errors, epsilon, known=known, stretches=_STRETCHES
         )
