@@ -71,12 +71,11 @@ def named(multipliers: Sequence[int], known: Sequence[Known]) -> str:
         ordered = sorted(terms, key=lambda term: _ARGUMENTS.index(term[1]))
         text = "".join(f"{m:+d}{name}" for m, name in ordered)
         return _ALONE.sub(r"\1", text).lstrip("+")
-    words = []
-    for n, (m, name) in enumerate(sorted(terms, key=lambda term: term[0] < 0)):
-        sign = "- " if m < 0 else "+ "
-        size = "" if abs(m) == 1 else f"{abs(m)} "
-        words.append((sign if n else sign.strip(" +")) + size + name)
-    return " ".join(words)
+    words = [
+        f"{'-' if m < 0 else '+'} {'' if abs(m) == 1 else f'{abs(m)} '}{name}"
+        for m, name in sorted(terms, key=lambda term: term[0] < 0)
+    ]
+    return re.sub("^- ", "-", " ".join(words).removeprefix("+ "))
 
 
 @lru_cache(maxsize=8)

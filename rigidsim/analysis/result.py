@@ -213,14 +213,14 @@ def _signal_dict(signal: SignalAnalysis, known: Sequence[Known]) -> dict[str, An
 
 def _null_because(line: SpectralLine) -> dict[str, str]:
     """Why numbers of a line are null, by their keys."""
-    reasons = {}
-    if not math.isfinite(line.phase_error):
-        reasons["phase_error_rad"] = "samples don't show the phase of a line at Nyquist's frequency"
-    if math.isnan(line.mismatch):
-        reasons["mismatch_rad_per_s"] = "no combination of known frequencies fits the line: it has no label"
-    if not line.frequency:
-        reasons["period_seconds"] = "the frequency is zero"
-    return reasons
+    unseen = "samples don't show the phase of a line at Nyquist's frequency"
+    no_label = "no combination of known frequencies fits the line: it has no label"
+    reasons = (
+        ("phase_error_rad", unseen, not math.isfinite(line.phase_error)),
+        ("mismatch_rad_per_s", no_label, math.isnan(line.mismatch)),
+        ("period_seconds", "the frequency is zero", not line.frequency),
+    )
+    return {key: why for key, why, holds in reasons if holds}
 
 
 def _number(value: Any) -> Any:

@@ -71,21 +71,14 @@ class Spectrum:
     turned: Complexes
     count: int
 
-    @property
-    def bin(self) -> float:
-        """One turn over the whole length, in turns per sample."""
-        return 1 / self.count
-
     def amplitude(self, at: int) -> complex:
         """Complex amplitude of one point, at the middle of the samples."""
         return complex(self.turned[at] * np.exp(1j * np.pi * self.frequencies[at] * (self.count - 1)))
 
     def around(self, frequency: float, reach: float) -> slice:
         """Points within ``reach`` bins of a frequency."""
-        low, high = np.searchsorted(
-            self.frequencies, (frequency - reach * self.bin, frequency + reach * self.bin)
-        )
-        return slice(int(low), int(high))
+        ends = frequency - reach / self.count, frequency + reach / self.count
+        return slice(*np.searchsorted(self.frequencies, ends).tolist())
 
     def noise(self, at: int, reach: float) -> float:
         """Median size beside a point, without points within ``reach`` bins."""

@@ -30,7 +30,6 @@ from rigidsim.look.stages.parts import (
     Stage,
     moving,
     points_wide,
-    screen_seconds,
 )  # fmt: skip
 from rigidsim.look.stages.registry import build_picture
 from rigidsim.look.thinning import thin_with_extremes, thinned_indices
@@ -143,7 +142,7 @@ Lane = tuple[str, Array, list[str], dict[str, Color]]
 @dataclass(frozen=True)
 class DrawnRun:
     """Everything drawn of one dataset: of its `rows` in memory, numbered by `steps`, with pages of markdown
-    by name, and the seconds on the screen in which it is played.
+    by name.
     """
 
     rows: xarray.Dataset
@@ -155,15 +154,12 @@ class DrawnRun:
     clock: Clock
     seconds: Array
     pages: dict[str, str]
-    words: TimeWords
-    screen_seconds: float
 
     @classmethod
     def of(cls, dataset: xarray.Dataset, most: int) -> Self:
         """The drawing of at most so many rows of a dataset, possibly lazy, on the clock that suits them."""
         rows, curves = (x.assign_attrs(dataset.attrs) for x in thin_with_extremes(dataset, most))
         seconds = signals.seconds(rows)
-        start, end = float(seconds[0]), float(seconds[-1])
         clock = dated(build_clock(seconds), epoch_of(rows.attrs))
         picture, _ = build_picture(rows)
         plots, paths = _about(rows, curves, picture)
@@ -186,8 +182,6 @@ class DrawnRun:
             clock=clock,
             seconds=seconds,
             pages={name: text for name, text in pages.items() if text},
-            words=TimeWords.of(dataset.attrs, start, end),
-            screen_seconds=screen_seconds(rows),
         )
 
     def entities(self, legend: Sequence[Stage] | None = None) -> list[tuple[str, Part]]:
@@ -202,7 +196,8 @@ class DrawnRun:
         explained = self.picture.stages if legend is None else legend
         if explained:
             rows = thinned_indices(len(self.seconds), CLOCK_ROWS)
-            words = [f"t = {text}" for text in self.words.coarse(self.seconds[rows].tolist())]
+            times = TimeWords.of(self.rows.attrs, float(self.seconds[0]), float(self.seconds[-1]))
+            words = [f"t = {text}" for text in times.coarse(self.seconds[rows].tolist())]
             flat += legend_parts(legend_of(explained), words, rows)
         return [*found, *((f"/{part.path}", part) for part in flat)]
 

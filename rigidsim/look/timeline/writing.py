@@ -25,7 +25,7 @@ from rigidsim.look.paths import Path as Plane
 from rigidsim.look.signals import seconds as seconds_of
 from rigidsim.look.signals import title_of, values
 from rigidsim.look.solids import Array, Color
-from rigidsim.look.stages.parts import Stage
+from rigidsim.look.stages.parts import Stage, screen_seconds
 from rigidsim.look.stages.uncertainty import CONE
 from rigidsim.look.timeline.drawn import (
     LEGEND_COLUMNS,
@@ -287,7 +287,7 @@ def build_blueprint(
     if run.states:
         right.append(rrb.StateTimelineView(origin="/states", name="Events"))
         heights.append(1.2)
-    panel = time_panel(clock, run.screen_seconds, following=following, hidden=part in PARTS)
+    panel = time_panel(clock, screen_seconds(run.rows), following=following, hidden=part in PARTS)
     whole = beside_plots(left, right, heights)
     shown: dict[str | None, rrb.View | rrb.Container] = {
         "scene": left,
@@ -326,7 +326,7 @@ def build_comparison(
         legend_of([stage for run in runs for stage in run.picture.stages]),
         {page.lower(): name for name, run in named for page in run.pages},
     )
-    panel = time_panel(clock, max(run.screen_seconds for run in runs), hidden=not bars)
+    panel = time_panel(clock, max(screen_seconds(run.rows) for run in runs), hidden=not bars)
     return page_of(beside_plots(left, views), panel, hidden=not bars)
 
 
