@@ -46,6 +46,7 @@ class Collected(SampleReceiver):
     Attributes:
         progress: how it ended.
         parts: of the assembly that took it there.
+        state: at the last sample.
     """
 
     def __init__(
@@ -57,7 +58,7 @@ class Collected(SampleReceiver):
 
     def take(self, block: SampleBlock) -> None:
         """See ``SampleReceiver``."""
-        recorded = self.parts.evaluator.evaluate(block)
+        recorded, self.state = self.parts.evaluator.evaluate(block), block.states[-1]
         for name, pieces in self._pieces.items():
             pieces.append(recorded[name])
 

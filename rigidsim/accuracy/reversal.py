@@ -19,7 +19,6 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.sample_times import SampleTimes
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.solve.problem import InitialValueProblem, prepare_scene
-from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
 
@@ -60,25 +59,15 @@ class Reversal:
     @property
     def words(self) -> str:
         """The difference in words."""
-        parts = []
-        if self.attitude is not None:
-            parts.append(f"attitude within {self.attitude:.2g} rad")
-        if self.rates is not None:
-            parts.append(f"angular velocity within {self.rates:.2g} of its size")
-        if self.position is not None:
-            parts.append(f"position within {self.position:.2g} m")
+        sizes = (
+            (self.attitude, "attitude", "rad"),
+            (self.rates, "angular velocity", "of its size"),
+            (self.position, "position", "m"),
+        )
+        parts = [f"{what} within {size:.2g} {unit}" for size, what, unit in sizes if size is not None]
         unit = "" if self.attitude is None else " rad"
         announced = "" if self.announced is None else f"; both ways announce {self.announced:.2g}{unit}"
         return f"integrated to the end and back, it returns to its start: {', '.join(parts)}{announced}"
-
-
-class _Ends(Collected):
-    """Start and end of a motion, with the state there."""
-
-    def take(self, block: SampleBlock) -> None:
-        """See ``SampleReceiver``."""
-        super().take(block)
-        self.state = block.states[-1]
 
 
 def there_and_back(experiment: Experiment, loads: Sequence[Load] = ()) -> Reversal:
@@ -88,17 +77,14 @@ def there_and_back(experiment: Experiment, loads: Sequence[Load] = ()) -> Revers
         ConfigError: it can't be integrated.
         RigidsimError: it ends before its last sample, or on the way back.
     """
-    config = experiment.config
-    regular = variables_named(config.integrator.formulation).regular
-    if not regular:  # whose charts change on the way
-        integrator = config.integrator.model_copy(update={"formulation": "quaternion"})
-        config = config.model_copy(update={"integrator": integrator})
-    names = [name for name in _SMALL if _records(replace(experiment, config=config), name, loads)]
+    if not variables_named(experiment.config.integrator.formulation).regular:  # whose charts change
+        experiment = experiment.having(['integrator.formulation="quaternion"'])
+    names = [name for name in _SMALL if _records(experiment, name, loads)]
     if "quaternion" in names and "momentum_axis" in names:
         names.remove("momentum_axis")
     if not names:
         raise ConfigError(Problem("[integrator]", "the motion has neither an attitude nor rates to compare"))
-    quiet = replace(experiment, config=config).quiet(names)
+    quiet = experiment.quiet(names)
     scene = build_scene(quiet)
     scene = _between(scene, scene.start, scene.samples.last)
     there = prepare_scene(quiet, scene, loads=loads)
@@ -139,8 +125,8 @@ def _between(scene: Scene, start: object, end: object) -> Scene:
     return replace(scene, start=start, end=end, samples=samples)
 
 
-def _taken(problem: InitialValueProblem, names: Sequence[str], what: str) -> _Ends:
-    found = _Ends(problem, names)
+def _taken(problem: InitialValueProblem, names: Sequence[str], what: str) -> Collected:
+    found = Collected(problem, names)
     if found.progress.status is not Status.FINISHED:
         raise RigidsimError(f"{what} {found.progress.status.message}, before its end; nothing was compared")
     return found

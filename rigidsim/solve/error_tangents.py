@@ -302,7 +302,7 @@ class ErrorTangents:
         self._carrier, self._measures, self._errors = carrier, measures, perturbations
         self._starts, self._held, self._epsilon = starts, held, epsilon
         none = np.zeros((0, len(starts.begin))), np.zeros((0, *starts.states.shape))
-        self._known_times, self._known_states = known or none
+        self._known: tuple[np.ndarray, np.ndarray] = known or none
         motions, self._states = len(starts.begin), starts.states.copy()
         self.time, self.spread = starts.begin.copy(), Spread(motions)
         self._steps, self._ahead, self._extent, self._lead = np.zeros((4, motions))
@@ -330,7 +330,7 @@ class ErrorTangents:
                 going = np.flatnonzero(self.spread.whole & (self.time < ends) & (self._lead < lost))
                 if not len(going) or not go_on():
                     return self.spread
-                known = self._known_times[:, going]
+                known = self._known[0][:, going]
                 ahead = np.where(known > self.time[going], known, math.inf)
                 self._stretch(going, np.minimum(ahead.min(axis=0, initial=math.inf), ends[going]))
 
@@ -364,9 +364,9 @@ class ErrorTangents:
         grown += self._kicks(np.maximum(taken - ahead, 0.0), sizes, normal[1::2])
         if angles := self._measures.angles:  # which grow, and step control with them
             found[angles] -= self._measures.turn * np.rint(found[angles] / self._measures.turn)
-        places = self._known_times[:, going] == reached
+        places = self._known[0][:, going] == reached
         for place, motion in zip(*np.nonzero(places), strict=True):  # of the motion itself
-            found[:, motion] = self._known_states[place, :, going[motion]]
+            found[:, motion] = self._known[1][place, :, going[motion]]
         some = followed & ~wild
         going = going[some]
         self._states[:, going], self._sizes[:, going] = found[:, some], sizes[:, some]
