@@ -7,6 +7,7 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
+from support import config
 
 from experiments.bare import blocks
 from experiments.closed_forms import free_top
@@ -329,3 +330,12 @@ def test_the_moon_of_de421_has_the_packages_constants() -> None:
     assert {key: float(tables["core"][key].split()[0]) for key in named} == {
         key: constants[name] for key, name in named.items()
     }
+
+
+def test_a_preset_takes_another_dynamical_ellipticity() -> None:
+    scene = build_scene(parse(config('preset = "earth"\ndynamical_ellipticity = "0.0032672658"')))
+    a, b, c = scene.body.principal_moments
+    assert a == b
+    assert abs((c - a) / c - scene.context.mpf("0.0032672658")) < 1e-40
+    with pytest.raises(ConfigError, match="it replaces smaller moments of a preset"):
+        build_scene(parse(config("principal_moments = [1, 2, 2.5]\ndynamical_ellipticity = 0.1")))

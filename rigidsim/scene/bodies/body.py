@@ -195,6 +195,10 @@ class Body(Solid):
     """solids that make up the body"""
     preset: Annotated[str, OneOf(PRESETS)] | None = None
     """name of a published body"""
+    dynamical_ellipticity: Annotated[Dimensionless, within("0", "0.5")] | None = Field(
+        None, examples=["0.0032672658"]
+    )
+    """of a preset: H = (C - A) / C, which replaces its smaller moments by A = B"""
     core: Core | None = None
     """a fluid core within the body"""
     elasticity: ElasticityTable | None = Field(None, examples=[{"love_number": 0.0216, "radius": "1738 km"}])
@@ -302,6 +306,9 @@ def build_body(table: Body, context: Any, sequence: str = "zxz", moments: Vector
     what = f"given {found}; exactly one of {', '.join(SOURCES)} is needed{beside}"
     ensure(len(own) == 1 or (preset and not own), refusal("", what))
     source = own[0] if own else "preset"
+    flattened = source == "preset" and preset is not None and not preset.parts
+    what = "it replaces smaller moments of a preset; give principal_moments instead"
+    ensure(table.dynamical_ellipticity is None or flattened, refusal("dynamical_ellipticity", what))
     if source != "shape":
         _refuse_dimensions(table, (), "which only a shape has", "")
     if not own and preset and preset.parts:
@@ -324,6 +331,10 @@ def _from_tensor(
     mass = None if table.mass is None else table.mass.at(context)
     if source == "preset" and preset:
         inertia = preset.inertia(context, mass)
+        if table.dynamical_ellipticity is not None:
+            values = [inertia[i][i] for i in range(3)]
+            flat = max(values) * (1 - table.dynamical_ellipticity.at(context))
+            inertia = diagonal([x if x == max(values) else flat for x in values])
     elif source == "principal_moments":
         inertia = diagonal(moments or vector(context, table.principal_moments))
     else:
