@@ -10,7 +10,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -69,18 +69,14 @@ def follow(read: Callable[[], tuple[xarray.Dataset | None, bool]], *, web: bool 
                     if dataset is not None:
                         with dataset:
                             recording.update(dataset)
-                    until = time.monotonic() + (_POLL_SECONDS if going_on else 0.0)
-                    while process.poll() is None and time.monotonic() < until:
-                        time.sleep(0.1)
+                    with suppress(subprocess.TimeoutExpired):
+                        process.wait(_POLL_SECONDS if going_on else 0.0)
             return _ended(process)
         except KeyboardInterrupt:
             return INTERRUPTED
         except RuntimeError:
-            # sent while the viewer was being closed
-            try:
+            with suppress(subprocess.TimeoutExpired):  # sent while the viewer was being closed
                 return _ended(process, _CLOSING_SECONDS)
-            except subprocess.TimeoutExpired:
-                pass
             raise
 
 
@@ -161,10 +157,7 @@ def viewer_binary() -> Path:
     if found is None or found.origin is None:
         raise FileNotFoundError("the rerun viewer isn't installed: pip install rerun-sdk")
     folder = Path(found.origin).parent
-    candidates = ["rerun.exe"] if sys.platform == "win32" else ["rerun"]
-    if sys.platform == "darwin":
-        candidates.insert(0, "Rerun.app/Contents/MacOS/Rerun")
-    for name in candidates:
+    for name in ("Rerun.app/Contents/MacOS/Rerun", "rerun.exe", "rerun"):  # each system has one of them
         if (folder / name).is_file():
             return folder / name
     raise FileNotFoundError(f"the rerun viewer isn't in {folder}: reinstall rerun-sdk")

@@ -297,13 +297,11 @@ def circle_of_precession(
 
 def _whole_revolution(dataset: xarray.Dataset, span: float) -> bool:
     """Whether a run is as long as a revolution of each source: of less, what a line fits is nutation too."""
-    known = {"sun": YEAR, "moon": _MONTH}
-    for one in scene_of(dataset).sources:
-        rate = (one.get("orbit") or {}).get("mean_motion")
-        period = 2 * np.pi / abs(rate) if rate else known.get(str(one.get("ephemeris", "")).lower(), 0.0)
-        if span < _ALMOST_WHOLE * period:
-            return False
-    return True
+    known, listed = {"sun": YEAR, "moon": _MONTH}, scene_of(dataset).sources
+    rates = [abs((one.get("orbit") or {}).get("mean_motion") or 0.0) for one in listed]
+    named = [known.get(str(one.get("ephemeris", "")).lower(), 0.0) for one in listed]
+    periods = [2 * np.pi / rate if rate else by_name for rate, by_name in zip(rates, named, strict=True)]
+    return span >= _ALMOST_WHOLE * max(periods, default=0.0)
 
 
 @optional

@@ -97,7 +97,8 @@ def add_cone(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Non
         why = "none of the fitted numbers moves it" if np.isfinite(angles).any() else "it has no bounds"
         picture.notes.append(f"no uncertainty of the figure axis is drawn: {why}")
         return
-    factor = drawn_factor(largest)
+    fitting = 10.0 ** np.floor(np.log10(_SHOWN / largest))
+    factor = 1.0 if _NARROW <= largest <= _WIDE else float(fitting)
     words = "1 sigma of the figure axis" + ("" if factor == 1 else f", drawn × {factor:g}")
     rim = np.nan_to_num(found.rim(factor))
     # the other side of a top's axis goes through the ground
@@ -117,11 +118,6 @@ def add_cone(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Non
     picture.plots.extend([replace(plot, error=None)] if plot else [])
     for stage in [one for one in picture.stages if one.size > _TO_SCALE]:
         stage.parts.extend(_cone(sides, _ON_DISC if stage.flat else _REACH, words))
-
-
-def drawn_factor(largest: float) -> float:
-    """By what half-angles are multiplied of which the largest (rad) is given: 1, or a power of ten."""
-    return 1.0 if _NARROW <= largest <= _WIDE else float(10.0 ** np.floor(np.log10(_SHOWN / largest)))
 
 
 def _cone(rims: Sequence[Array], reach: float, words: str) -> list[Part]:
