@@ -62,7 +62,7 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None, for_slides: s
     swept = isinstance(folder_at(run_path), SweepFolder)
     if swept or SPECTRUM in (what or []):
         refuse_options("is for figures of a single run other than spectrum", for_slides=for_slides)
-    saved = open_sweep(run_path) if swept else shown(run_path)
+    saved: SavedSweep | SavedRun | ShownRun = open_sweep(run_path) if swept else shown(run_path)
     _report_notes(saved)
     wanted = list(dict.fromkeys(what or []))
     try:
@@ -80,11 +80,7 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None, for_slides: s
             own = "" if name == OVERVIEW else "_" + name.replace("[", "_").replace("]", "")
             own += "" if for_slides is None else "_slide"
             file = f"figure{own}.png"
-            usual = (
-                saved.folder.path / file
-                if isinstance(saved, SavedRun | SavedSweep)
-                else _in_folder_of(saved, file)
-            )
+            usual = _in_folder_of(saved, file) if isinstance(saved, ShownRun) else saved.folder.path / file
             target = usual if out is None else out / usual.name if several else out
             try:
                 kind = figure_format(target)
