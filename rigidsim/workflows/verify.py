@@ -12,7 +12,7 @@ import numpy as np
 import xarray
 
 from rigidsim.accuracy.reversal import Reversal, there_and_back
-from rigidsim.errors import RESUME, ConfigError, Problem, RigidsimError, RunFolderError, run_again
+from rigidsim.errors import RESUME, ConfigError, Problem, Remedy, RigidsimError, RunFolderError, run_again
 from rigidsim.scene.sweep import Sweep
 from rigidsim.session.session import Observer
 from rigidsim.solve.status import Status
@@ -91,7 +91,7 @@ def verify(
     path: str | Path,
     *,
     reversed: bool = False,
-    members: int = MEMBERS,
+    members: int | None = None,
     seed: int | None = None,
     observer: Observer | None = None,
     report: Callable[[str], None] = lambda _: None,
@@ -102,20 +102,27 @@ def verify(
         path: its folder with a dataset, or a run's dataset alone.
         reversed: whether a run's motion is integrated to its end and back, too. A difference of more than ten
             times both ways' announced errors counts as a problem.
-        members: how many members of a sweep are run again, in other company than before; they are drawn anew
-            each time unless a ``seed`` is given.
+        members: how many members of a sweep are run again, in other company than before, ``MEMBERS`` by
+            default; they are drawn anew each time unless a ``seed`` is given.
         observer: receives the progress of a run's integration. report: lines on a fit's.
 
     Raises:
         RunFolderError: there is no dataset, or one that no config can reproduce.
         ConfigError: the embedded config isn't valid.
+        RigidsimError: an option of runs or of sweeps is given for something else.
         KeyboardInterrupt: the integration was interrupted; nothing was compared.
     """
     folder = folder_at(path)
+    if members is not None and not isinstance(folder, SweepFolder):
+        option = Remedy("--members", "members")
+        raise RigidsimError(f"{option}: is for sweeps; {path} is compared as a whole; leave it out")
+    if reversed and isinstance(folder, SweepFolder | FitFolder):
+        option = Remedy("--reversed", "reversed")
+        raise RigidsimError(f"{option}: is for single runs, and {path} is none; leave it out")
     if isinstance(folder, FitFolder):
         return _verified_fit(folder, report)
     if isinstance(folder, SweepFolder):
-        return _verified_sweep(folder, members, seed)
+        return _verified_sweep(folder, MEMBERS if members is None else members, seed)
     return _verified_run(path, reversed, observer)
 
 

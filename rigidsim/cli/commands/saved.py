@@ -49,19 +49,13 @@ def resume(
 
 def verify(run_path: Path, members: int | None, back: bool, as_json: bool) -> int:
     """Make it again and compare."""
-    from rigidsim.workflows import verify as verifying
+    from rigidsim.workflows import verify as verifying  # which loads what integrates
 
-    folder = folder_at(run_path)
     kinds: dict[Any, str] = {FitFolder: "variable", SweepFolder: "member"}
-    what = kinds.get(type(folder), "sample")
-    if what != "member":
-        refuse_options(f"is for sweeps; {run_path} is compared as a whole", members=members)
-    if what != "sample":
-        refuse_options(f"is for single runs, and {run_path} is none", reversed=back)
-    many = verifying.MEMBERS if members is None else members
+    what = kinds.get(type(folder_at(run_path)), "sample")
     with watched(None, what == "sample") as observer:
         found = verifying.verify(
-            run_path, reversed=back, members=many, observer=observer, report=reporting("fit")
+            run_path, reversed=back, members=members, observer=observer, report=reporting("fit")
         )
     shown = found.as_dict()
     answer(as_json, shown, print_verdict, shown, what)
