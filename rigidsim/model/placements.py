@@ -251,7 +251,7 @@ class Placement:
 
     def at_start(self, scene: Setting) -> Vector:
         """Place at the start, m (mpf)."""
-        raise NotImplementedError
+        return self.motion_at_start(scene)[0]
 
     def nearest(self, scene: Setting) -> Any:
         """Least distance, m (mpf), for sizes of torques."""
@@ -279,7 +279,7 @@ class Placement:
         """Place, velocity and acceleration, where they are known."""
         raise NotImplementedError
 
-    def motion_at_start(self, scene: Scene) -> tuple[Vector, Vector, Vector]:
+    def motion_at_start(self, scene: Setting) -> tuple[Vector, Vector, Vector]:
         """The same at the start (mpf, SI)."""
         raise NotImplementedError
 
@@ -331,14 +331,11 @@ class PlacedAtRest(Placement):
         context = m.scene.context
         return SourcePlace(m.fixed(self._direction(context)), hy.expression(1.0), self.distance(context))
 
-    def at_start(self, scene: Setting) -> Vector:
-        return self.position
-
     def motion(self, m: Kinematics) -> SourceMotion:
         place, zero = self.seen(m), [hy.expression(0.0)] * 3
         return SourceMotion(place.line, zero, zero, place.inverse, place.unit)
 
-    def motion_at_start(self, scene: Scene) -> tuple[Vector, Vector, Vector]:
+    def motion_at_start(self, scene: Setting) -> tuple[Vector, Vector, Vector]:
         return self.position, [scene.context.zero] * 3, [scene.context.zero] * 3
 
     def circuit(self, context: Any) -> Circuit:
@@ -375,7 +372,7 @@ class PlacedOnOrbit(Placement):
             *m.carried(states.parts).motions(), states.inverse_distance, self.orbit.semi_major_axis
         )
 
-    def motion_at_start(self, scene: Scene) -> tuple[Vector, Vector, Vector]:
+    def motion_at_start(self, scene: Setting) -> tuple[Vector, Vector, Vector]:
         axis, found = self.orbit.semi_major_axis, KeplerParts.at(self.orbit, scene.context, scene.start)
         place, velocity, acceleration = ([axis * x for x in vector] for vector in found.motions())
         return place, velocity, acceleration
@@ -635,15 +632,12 @@ class PlacedAsMass(AmongMasses):
         line = [x * inverse for x in states.between(host, self.number)]
         return SourcePlace(line, inverse, context.ldexp(context.one, m.scaling.length))
 
-    def at_start(self, scene: Setting) -> Vector:
-        return self._relative(scene.context)[0]
-
     def motion(self, m: Kinematics) -> SourceMotion:
         """Under the mutual gravity of all as points."""
         found, place = m.carried(m.point_masses).relative(self.host, self.number), self.seen(m)
         return SourceMotion(*found, place.inverse, place.unit)
 
-    def motion_at_start(self, scene: Scene) -> tuple[Vector, Vector, Vector]:
+    def motion_at_start(self, scene: Setting) -> tuple[Vector, Vector, Vector]:
         return self._relative(scene.context)
 
     def velocity(self, m: Kinematics) -> list[Symbolic]:
@@ -739,7 +733,7 @@ class PlacedByKernel(Placement):
         found = self.seen(m)
         return SourceMotion(place, velocity, acceleration, found.inverse, found.unit)
 
-    def motion_at_start(self, scene: Scene) -> tuple[Vector, Vector, Vector]:
+    def motion_at_start(self, scene: Setting) -> tuple[Vector, Vector, Vector]:
         found = (self.ephemeris.place(scene.context, self.sight, scene.start, order) for order in range(3))
         place, velocity, acceleration = found
         return place, velocity, acceleration

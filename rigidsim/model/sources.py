@@ -92,17 +92,12 @@ class SeenSource:
 
 def sources_of(config: Config) -> list[SeenSource]:
     """All loads of a config whose sources are at known places."""
-    flies, found = free_flight(config), []
+    flies, found = config.initial.flies, []
     for number, fields in enumerate(config.loads):
         states = fields.placed_by(free_flight=flies)
         if states is not None:
             found.append(SeenSource(number, fields, states | {PLACES}))
     return found
-
-
-def free_flight(config: Config) -> bool:
-    """Whether the body has a position."""
-    return config.initial.flies
 
 
 def read_in(scene: Scene) -> frozenset[str]:
@@ -117,7 +112,7 @@ def in_body_axes(scene: Scene, space: Vector) -> Vector:
 
 def flown_about(config: Config) -> SeenSource | None:
     """The load about whose source the body flies through air; None without one."""
-    if not free_flight(config):
+    if not config.initial.flies:
         return None
     found = [x for x in sources_of(config) if hasattr(x.fields, "atmosphere_rate")]
     with_air = [x for x in found if x.extended or x.fields.atmosphere_rate is not None]  # type: ignore[attr-defined]

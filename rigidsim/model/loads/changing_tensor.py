@@ -723,7 +723,13 @@ class Elasticity(Load, Carrier):
 
     def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
         yield from _about_radius(fields, scene)
-        yield from _about_delay(plain(self.delay), self.turned_within(scene))
+        if (turned := self.turned_within(scene)) > _LATE:
+            late = span_text(float(plain(self.delay)), 4)
+            yield Caution(
+                WarningCode.DELAY_TOO_LONG,
+                f"{WHERE} delay: in {late} body and source turn by {turned:.2g} rad, of which the expansion "
+                f"to second order leaves out some {turned**2 / 6:.1%} of what the delay does",
+            )
 
     # --- at the start, in numbers ---------------------------------------------------------------------------
 
@@ -824,16 +830,6 @@ class Elasticity(Load, Carrier):
 
 def _rounded(m: Kinematics, matrix: Matrix) -> Matrix:
     return [[rounded(m.number(x)) if x != 0 else 0 for x in row] for row in matrix]
-
-
-def _about_delay(delay: Any, turned: float) -> Iterator[Caution]:
-    """A delay whose expansion leaves out a part of what it does."""
-    if turned > _LATE:
-        yield Caution(
-            WarningCode.DELAY_TOO_LONG,
-            f"{WHERE} delay: in {span_text(float(delay), 4)} body and source turn by {turned:.2g} rad, of "
-            f"which the expansion to second order leaves out some {turned**2 / 6:.1%} of what the delay does",
-        )
 
 
 def _about_radius(body: Any, scene: Scene) -> Iterator[Caution]:

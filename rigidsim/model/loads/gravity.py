@@ -515,7 +515,6 @@ class BodyField(ByPlacedSource):
 
     @classmethod
     def beside_of(cls, load: Any, fields: Any, around: Setting) -> Load | None:
-        assert isinstance(load, Attraction)
         degree, field, placement = fields.degree, around.body.gravity, load.placement
         if degree < LEAST:
             return None
@@ -681,7 +680,6 @@ class SourceFigure(ByPlacedSource):
 
     @classmethod
     def beside_of(cls, load: Any, fields: Any, around: Setting) -> Load:
-        assert isinstance(load, Attraction)
         given, context, placement = fields.figure, around.context, load.placement
         radius = given.radius.at(context)
         if load.pulls:
@@ -810,7 +808,6 @@ class SourceField(ByPlacedSource):
 
     @classmethod
     def beside_of(cls, load: Any, fields: Any, around: Setting) -> Load:
-        assert isinstance(load, Attraction)
         given, context = fields.gravity_field, around.context
         ensure(
             fields.figure is None or "2,0" not in given.C,

@@ -22,7 +22,7 @@ from rigidsim.model.loads.gravity import CentralGravity, CentralGravityFields, P
 from rigidsim.model.names import written
 from rigidsim.model.placements import NOWHERE, FlownAbout, PlacedOnOrbit, Placement
 from rigidsim.model.rotations import Symbolic, along
-from rigidsim.model.sources import free_flight, in_body_axes, read_in
+from rigidsim.model.sources import in_body_axes, read_in
 from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, norm, transpose, unit_vectors
 from rigidsim.scene.bodies.presets import EARTH
@@ -407,7 +407,7 @@ class FieldNames(NameProvider):
 
     def names(self, config: Config) -> Iterable[Readable]:
         """See ``NameProvider``."""
-        flies, states, found = free_flight(config), {"attitude", PLACES}, False
+        flies, states, found = config.initial.flies, {"attitude", PLACES}, False
         for fields in config.loads:
             if isinstance(fields, MagneticFieldFields):
                 found, states = True, states | (fields.placed_by(free_flight=flies) or set())
