@@ -13,7 +13,7 @@ from rigidsim.scene.sweep import Sweep
 from rigidsim.store import pictures
 from rigidsim.store.folder import FitFolder, SweepFolder, folder_at
 from rigidsim.store.pictures import FrameProgress
-from rigidsim.store.run import Run, SavedRun, open_run
+from rigidsim.store.run import Run, SavedRun, ShownRun, open_run
 from rigidsim.store.sweeps.saved import open_sweep
 from rigidsim.workflows.compare.as_run import open_any
 from rigidsim.workflows.fit.fitting import fitted_run, read_dataset
@@ -33,7 +33,7 @@ def runs_of(paths: Sequence[Path], members: Sequence[int] = ()) -> list[tuple[st
     return list(zip(names, runs, strict=True))
 
 
-def shown(path: Path) -> Run:
+def shown(path: Path) -> SavedRun | ShownRun:
     """A run, the motion of a fit, or another tool's file; a sweep is refused."""
     folder = folder_at(path)
     if isinstance(folder, SweepFolder):
