@@ -658,20 +658,18 @@ def choose_level(
     considered: list[Considered] = []
     for level in CHEAPEST_FIRST:
         other = experiment.having([f'model.level="{level}"'])
-        why_not = "its measured error was larger than asked for" if level in without else ""
+        found, why_not = None, "its measured error was larger than asked for" if level in without else ""
         try:
             found = None if why_not else measure_modelling(prepare(other, loads=loads))
-        except ConfigError as error:
-            found, why_not = None, "; ".join(p.what for p in error.problems)
-        except Unmeasured as why:
-            found, why_not = None, str(why)
+        except (ConfigError, Unmeasured) as error:
+            problems = error.problems if isinstance(error, ConfigError) else []
+            why_not = "; ".join(problem.what for problem in problems) or str(error)
         if found is None:
             considered.append(Considered(level, None, why_not))
             continue
-        kept = found.worst <= asked
-        why_not = "" if kept else "more than asked for"
+        why_not = "" if found.worst <= asked else "more than asked for"
         considered.append(Considered(level, found.worst, why_not, found.seconds_of_run))
-        if kept:
+        if not why_not:
             return LevelChoice(other, level, considered)
     considered.append(Considered(FULL, 0.0, ""))
     return LevelChoice(fully(experiment), FULL, considered)
