@@ -167,8 +167,8 @@ def _kinds(
     """The kind of each argument, a number that those in a constant ratio share, and the ratio's sign.
 
     They are compared in all digits of the scene, and a sign within them has both values at random, wherever
-    its own surface lies: ``max(t - 5, 0) - 1`` and ``max(t - 8, 0) - 1`` are equal before 5. Of four states in
-    place of all, 6 of 40 random sums of nested maxima had arguments taken for others.
+    its own surface lies: ``max(t - 5, 0) - 1`` and ``max(t - 8, 0) - 1`` are equal before 5. At four states
+    in place of all, 6 of 40 random sums of nested maxima had arguments taken for others.
     """
     found: dict[Expression, tuple[int, int]] = {}
     known: list[list[Any]] = []
