@@ -95,46 +95,44 @@ def vectors_of(
     """Angular momentum and velocity, `longer` than others by these factors, if wanted the paths of the
     latter's tip, and notes on their scales.
     """
-    shown: list[Part] = []
-    notes: list[str] = []
-    attitude = subject.attitude
+    shown, notes, attitude = list[Part](), list[str](), subject.attitude
     place = BODY if attitude is None else CENTRE
+
+    def put(note: str, *drawn: Part) -> None:
+        shown.extend(drawn)
+        notes.append(note)
 
     def placed(vectors: Array) -> Array:
         return vectors if attitude is None else np.einsum("tij,tj->ti", attitude, vectors)
 
     momentum = values(dataset, "angular_momentum", 3)
     if momentum is not None and attitude is not None and parts.longest(momentum) > 0:
-        factor = parts.ARROW_REACH / parts.longest(momentum)
-        words = "angular momentum L"
-        drawn = longer[0] * factor * momentum
-        shown.append(arrow("angular_momentum", "L", parts.MOMENTUM, drawn, words, label_at=1.09))
-        notes.append(f"{words} (yellow), space axes: 1 unit = {1 / factor:.6g} kg m²/s")
+        words, factor = "angular momentum L", parts.ARROW_REACH / parts.longest(momentum)
+        tip = longer[0] * factor * momentum
+        drawn = arrow("angular_momentum", "L", parts.MOMENTUM, tip, words, label_at=1.09)
+        put(f"{words} (yellow), space axes: 1 unit = {1 / factor:.6g} kg m²/s", drawn)
     rates = values(dataset, "angular_velocity", 3)
     if rates is None or not parts.longest(rates) > 0:
         return shown, notes
-    factor = parts.ARROW_REACH / parts.longest(rates)
-    tip, words, at = placed(factor * rates), "angular velocity ω", 0.93 if shown else 1.07
-    shown.append(
-        arrow("angular_velocity", "ω", parts.VELOCITY, longer[1] * tip, words, place=place, label_at=at)
-    )
-    notes.append(f"{words} (cyan): 1 unit = {1 / factor:.6g} rad/s")
+    words, factor = "angular velocity ω", parts.ARROW_REACH / parts.longest(rates)
+    tip, at = placed(factor * rates), 0.93 if shown else 1.07
+    drawn = arrow("angular_velocity", "ω", parts.VELOCITY, longer[1] * tip, words, place=place, label_at=at)
+    put(f"{words} (cyan): 1 unit = {1 / factor:.6g} rad/s", drawn)
     core = values(dataset, "core_angular_velocity", 3)
     if core is not None:
         words = "angular velocity of the core"
-        drawn = placed(factor * core)
-        shown.append(arrow("core_angular_velocity", "core", parts.OF_CORE, drawn, words, place=place))
-        notes.append(f"{words} (orange), in the same unit")
-    if paths:
-        words = "polhode: ω's path in the body"
-        shown += trail("polhode", parts.POLHODE, factor * rates, words, place=BODY)
-        notes.append("polhode (pink): the path of the tip of ω in body axes, carried by the body")
-    if paths and attitude is not None:
-        words = "herpolhode: ω's path in space"
-        shown += trail("herpolhode", parts.VELOCITY, tip, words, place=CENTRE)
-        notes.append("herpolhode (cyan): the path of the tip of ω in space axes")
-    if paths:
-        notes.append("trails: bright for the time just passed, dark for the whole run")
+        drawn = arrow(
+            "core_angular_velocity", "core", parts.OF_CORE, placed(factor * core), words, place=place
+        )
+        put(f"{words} (orange), in the same unit", drawn)
+    if not paths:
+        return shown, notes
+    in_body = trail("polhode", parts.POLHODE, factor * rates, "polhode: ω's path in the body", place=BODY)
+    put("polhode (pink): the path of the tip of ω in body axes, carried by the body", *in_body)
+    if attitude is not None:
+        in_space = trail("herpolhode", parts.VELOCITY, tip, "herpolhode: ω's path in space", place=CENTRE)
+        put("herpolhode (cyan): the path of the tip of ω in space axes", *in_space)
+    notes.append("trails: bright for the time just passed, dark for the whole run")
     return shown, notes
 
 
