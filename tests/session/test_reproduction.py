@@ -14,8 +14,6 @@ from rigidsim.session.session import Tuning
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sampler import Pacing
 
-pytestmark = pytest.mark.optimised
-
 GRIDS = {
     "dense": "end = 40\nsamples = 641",
     "a sample per step": "end = 40\nsamples = 81",
@@ -72,6 +70,7 @@ BARE = [
 ]
 
 
+@pytest.mark.optimised
 @pytest.mark.parametrize("case", cases(BARE, BARE[1:3]), ids="-".join)
 def test_it_is_one_bare_propagation(
     case: tuple[str, str, str], tmp_path: Path, free_body: Callable[..., str]
