@@ -23,8 +23,8 @@ _AT_REST = 1e-3  # of its largest rate, below which a body doesn't turn
 _REGULAR = 0.05  # by which swings may differ that have one period
 _FROM_TO = {
     "tilt": "tilt", "wobble": "nutation angle", "pointing": "pointing error", "roll_pitch_yaw": "{}",
-    "libration": "libration {}", "rotor_tilts": "rotor {}, axis from the momentum", "rotor_rates": "rotor {}",
-    "braking": "remaining {}", "core_axis": "core axis from the mantle's",
+    "libration": "libration {}", "rotor_tilts": "axis of rotor {} off L",
+    "rotor_rates": "rate of rotor {}", "braking": "remaining {}", "core_axis": "core axis from the mantle's",
 }  # fmt: skip
 """Names of curves, and what their numbers are called."""
 _GLYPHS = (
@@ -161,7 +161,7 @@ def _circling(rows: xarray.Dataset) -> Iterator[tuple[str, Array | None]]:
     along, axis = signals.steady_momentum(rows), signals.pole(rows, "figure")
     if along is not None and axis is not None and not signals.aliased(rows):
         yield (
-            "figure axis round the momentum in",
+            "axis circles the momentum in",
             np.stack([axis @ one for one in signals.across(along)], axis=1),
         )
     position = signals.values(rows, "position", 3)
@@ -176,12 +176,13 @@ def _precession(rows: xarray.Dataset) -> list[tuple[str, str]]:
     """The rate of a top about the vertical, or the period and the tilt with which a body's axis precesses."""
     seconds, angle = signals.seconds(rows), signals.values(rows, "precession_angle")
     if angle is not None:
-        return [("precession", turning_text(secular(seconds, angle).rate))]
+        mean = secular(seconds, angle)
+        return [("precession", mean.about + turning_text(mean.rate))]
     follows = sources.librates(rows) and CURVES["latitude_libration"](rows) is None  # its orbit
     if not precesses(rows) or follows or signals.is_top(rows) or sources.pointing_angle(rows) is not None:
         return []
     name, (tilt, node) = next(iter(orientations(rows).items()))
-    mean, found = secular(seconds, node), []
+    mean, found = secular(seconds, node), list[tuple[str, str]]()
     stray = float(np.nanmax(np.abs(node - mean.at(seconds))))
     if mean.known and abs(mean.rate) * np.ptp(seconds) > max(stray, _LEAST):
         found = [(f"{name} axis precesses in", turn_text(mean, rows.attrs))]
