@@ -123,8 +123,8 @@ def moves(values: Array) -> bool:
 
 
 def crossings(column: Array) -> int:
-    """How often a curve passes its mean."""
-    return int(np.count_nonzero(np.diff(np.signbit(column - np.nanmean(column)))))
+    """How often a curve passes its mean; 0 if it is constant but for rounding."""
+    return int(np.count_nonzero(np.diff(np.signbit(column - np.nanmean(column))))) if moves(column) else 0
 
 
 def uncertain(dataset: xarray.Dataset, values: Array, divisor: float) -> Array | None:
