@@ -144,7 +144,7 @@ def nutation(dataset: xarray.Dataset) -> Path:
     ellipse, drawn = fits.leading_ellipse(seconds, node, tilt, float(np.sin(mean))), None
     if ellipse is not None:
         points, axes, rate = ellipse
-        long, short = (angle_text(size, 3) for size in axes)
+        long, short = (angle_text(size, 3, like=axes[0]) for size in axes)
         words = f"{period_text(_TURN / rate, dataset.attrs)}: semi-axes {long}, {short}"
         drawn = points / scaled(path, "rad")[0], words
     title, labels = "Nutation: the pole about its mean motion", ("Δlongitude · sin(obliquity)", "Δobliquity")

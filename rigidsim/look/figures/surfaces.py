@@ -165,6 +165,7 @@ class View:
         if not reach > 1e-6 * float(np.nanmax(np.abs(points))):  # a point and its rounding
             reach = float(np.nanmax(np.abs(points))) or 1.0
         corner = low - 0.04 * reach
+        self.axes.margins(0.25, 0.28)  # labels of two lines, below the title
         for k, name in enumerate(names):
             stop = np.where(np.arange(3) == k, high + 0.12 * reach, corner)
             self.spoke(corner, stop, f"{name}\n{typeset(low[k], 3)} … {typeset(high[k], 3)}", COLORS[k])
