@@ -73,12 +73,15 @@ def planar(
     return Path(name, title, plane / divisor, across, up, unit, others=beside, **options)
 
 
-def once_round(dataset: xarray.Dataset, plane: Array) -> str:
-    """Words on the period and the sense in which a point goes round the origin; empty if it doesn't."""
+def once_round(dataset: xarray.Dataset, plane: Array, node: Array | None = None) -> str:
+    """Words on the period and the sense in which a point goes round the origin; empty if it doesn't. The rate
+    is the mean motion of the node (rows,), rad, of a pole that precesses.
+    """
     mean = fits.circulation(signals.seconds(dataset), plane)
     if mean is None:
         return ""
     way = "counterclockwise" if mean.rate > 0 else "clockwise"
+    mean = mean if node is None else fits.secular(signals.seconds(dataset), node)
     return f": once round in {fits.turn_text(mean, dataset.attrs)}, {way}"
 
 
@@ -98,7 +101,7 @@ def pole_path(dataset: xarray.Dataset) -> Path:
     """Path of the figure axis in space, seen from outside along the pole that it circles: of a free body the
     momentum, else the reference plane's. Distances from the centre are angles.
     """
-    along = signals.steady_momentum(dataset)
+    along, node = signals.steady_momentum(dataset), None
     if along is not None:
         frame = np.stack([*signals.across(along), along], axis=1)
         axes = {name: signals.pole(dataset, name) for name in ("figure", "spin", "core")}
@@ -112,12 +115,13 @@ def pole_path(dataset: xarray.Dataset) -> Path:
             if pair is not None
         }
         title, names, center = "the pole", ("along X", "along Y"), "reference pole"
+        node = next((pair[1] for pair in found.values() if pair is not None), None)
     need(bool(paths))
     shown = next(iter(paths.values()))
     reach = max(float(np.nanmax(np.abs(shown - np.nanmean(shown, axis=0)))), 1e-300)
     others = {f"{n} axis": p for n, p in paths.items() if not np.nanmax(np.abs(p - shown)) < _SAME * reach}
     sparse = along is not None and signals.aliased(dataset)
-    title = f"Path of {title} in space" + ("" if sparse else once_round(dataset, shown))
+    title = f"Path of {title} in space" + ("" if sparse else once_round(dataset, shown, node))
     if np.nanmin(signals.norms(shown)) > 3 * reach:  # so far that it would press the path flat
         center = ""
     return planar("pole_path", title, shown, *names, center=center, others=others, sparse=sparse)

@@ -60,7 +60,7 @@ class View:
     toward: Array
 
     @classmethod
-    def of(cls, axes: Axes, toward: Array, *, aside: float = 0.2, above: float = 0.15) -> Self:
+    def of(cls, axes: Axes, toward: Array, *, aside: float = 0.2, above: float = 0.2) -> Self:
         """The view from direction `toward` (3,), which isn't Z, with Z upwards, equal scales, and margins for
         labels, in shares of what is drawn.
         """
