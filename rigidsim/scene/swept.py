@@ -2,7 +2,8 @@
 
 A swept number is an array, with a value for each member. Scene and model are worked out with it as with any
 other number. Whatever they decide by it (a comparison, a value taken as a float) is decided by the first
-member: the others that decide otherwise are left out (``agree``), and are worked out apart.
+member: the others that decide otherwise are left out (``agree``), and are worked out apart. Numbers remember
+how they were made, so that later members go through the same operations and decisions alone.
 
 heyoka's arrays of multiprecision numbers (MPFR) round sums, products, quotients and roots as mpmath does, so
 that each member's numbers equal its own build's in every bit. Other functions are mpmath's own, once for
@@ -55,6 +56,10 @@ class Swept:
             with np.errstate(all="ignore"):
                 self._worked_out = self._work()
         return self._worked_out
+
+    def forget(self) -> None:
+        """Have it worked out again, for other members."""
+        self._worked_out = None
 
     @property
     def first(self) -> Any:
@@ -212,12 +217,25 @@ class SweptContext:
         agree: mask of the members that have decided everything so far as the first one does.
     """
 
-    def __init__(self, context: Any, members: int) -> None:
+    def __init__(self, context: Any, columns: Sequence[np.ndarray], members: int) -> None:
         from heyoka import real  # which few configs need
 
         self.plain, self._real = context, real
-        self.agree: np.ndarray = np.ones(members, dtype=bool)
-        self._known: dict[Any, Any] = {}
+        self._known: dict[Any, Swept] = {}
+        self._decided: dict[int, tuple[Swept, tuple[Any, Any], bool]] = {}
+        self.begin(columns, members)
+
+    def begin(self, columns: Sequence[np.ndarray], members: int) -> None:
+        """Take other members, and find those that decide everything as the first one of all did."""
+        self._columns, self.agree = columns, np.ones(members, dtype=bool)
+        for number in self._known.values():
+            number.forget()
+        for decision in self._decided.values():
+            self._follow(*decision)
+
+    def column(self, place: int) -> Swept:
+        """The swept number of a column."""
+        return self._known.setdefault(("column", place), Swept(self, lambda: self._columns[place]))
 
     # --- arrays -----------------------------------------------------------------------------------------
 
@@ -283,11 +301,16 @@ class SweptContext:
     def decide(self, compare: Callable[[Any, Any], Any], left: Any, right: Any) -> bool:
         """Compare as the first member does, and leave out whoever does so with another outcome, or can't."""
         pair = self.convert(left), self.convert(right)
-        outcomes = self.made(compare, *pair).values
-        self.agree &= outcomes == outcomes[0]
+        outcomes = self.made(compare, *pair)
+        if id(outcomes) not in self._decided:
+            self._decided[id(outcomes)] = outcomes, pair, bool(outcomes.values[0])
+            self._follow(*self._decided[id(outcomes)])
+        return self._decided[id(outcomes)][2]
+
+    def _follow(self, outcomes: Swept, pair: tuple[Any, Any], first: bool) -> None:
+        self.agree &= outcomes.values == first
         for x in pair:
             self.agree &= np.isfinite(x.values if isinstance(x, Swept) else self.real_of(x))
-        return bool(outcomes[0])
 
     def out_of_range(self) -> Untraceable:
         """The error for a number of the first member alone, whatever the others have."""

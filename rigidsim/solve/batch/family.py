@@ -12,8 +12,9 @@ otherwise.
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property, lru_cache, partial
@@ -48,6 +49,7 @@ from rigidsim.solve.status import Status
 
 _HELD = 1 << 16  # values of axes that are held, each worked out once for all members that share it
 _AT_ONCE = 4096  # members whose numbers are worked out together
+_MOST_KNOWN = 256  # families that a process keeps for later members
 _SWEPT_TABLES = ("body", "initial", "loads", "rotors", "parameters")
 """Config tables whose numbers may become parameters."""
 _DOUBLE = precision_of("double")
@@ -129,7 +131,8 @@ class AxisNumbers:
         self.sweep = sweep
         self._words: dict[int, dict[str, int]] = {}
         self._reals = lru_cache(_HELD)(self._reals_of)
-        self._context = SweptContext(context_for("double"), 0)
+        self._context = SweptContext(context_for("double"), (), 0)
+        self.known: list[Family] = []
 
     @cached_property
     def drive(self) -> EstimatedEffect | None:
@@ -208,7 +211,7 @@ class Members:
 
 
 class Family:
-    """Members that share a system of equations, and their numbers.
+    """Members of a kind that share a system of equations, worked out with the decisions of the first.
 
     Attributes:
         prepared: the first member's own problem, in plain numbers.
@@ -218,23 +221,32 @@ class Family:
         parameters: values of ``variables``, (parameters, members).
     """
 
-    def __init__(
-        self, prepared: InitialValueProblem, scene: Scene, like: ModelPlan, candidates: np.ndarray
-    ) -> None:
-        self.prepared, self._context = prepared, scene.context
+    members: np.ndarray
+    initial: np.ndarray
+    parameters: np.ndarray
+
+    def __init__(self, prepared: InitialValueProblem, scene: Scene, like: ModelPlan, kind: int) -> None:
+        self.prepared, self.context, self.kind = prepared, scene.context, kind
         self._swept: dict[int, tuple[Swept, Any]] = {}
         self.system = System(plan_model(scene, like=like), self._number)
         for part in ("equations", "outputs", "invariants", "crossings", "rate_bound"):
             getattr(self.system, part)
-        if not self._context.agree[0]:  # a decision by a number that it hasn't
-            raise self._context.out_of_range()
-        self._chosen = np.flatnonzero(self._context.agree)
-        numbers = [*self.system.initial, *(value for value, _ in self._swept.values())]
-        found = np.array([self.doubles(value) for value in numbers])
+        if not self.context.agree[0]:  # a decision by a number that it hasn't
+            raise self.context.out_of_range()
+
+    def of(self, candidates: np.ndarray) -> Family:
+        """The family of those that decide as the first member did, and whose numbers doubles can hold."""
+        system, scaling = self.system, self.system.scaling
+        chosen, count = np.flatnonzero(self.context.agree), len(system.initial)
+        numbers = [*system.initial, *(value for value, _ in self._swept.values())]
+        found = np.array([self.context.doubles(value)[chosen] for value in numbers])
         within = np.isfinite(found).all(axis=0)
-        self._chosen, found = self._chosen[within], found[:, within]
-        self.members = candidates[self._chosen]
-        self.initial, self.parameters = np.split(found, [len(self.system.initial)])
+        part, chosen, found = copy.copy(self), chosen[within], found[:, within]
+        part.members, part.initial, part.parameters = candidates[chosen], found[:count], found[count:]
+        asked = [system.rate_bound, scaling.time, scaling.length, scaling.speed, *system.scene.quaternion]
+        asked += [*system.state_exponents, *(x for one in system.recorded for x in one.exponents)]
+        part._doubles = {id(x): self.context.doubles(x)[chosen] for x in asked if isinstance(x, Swept)}
+        return part
 
     def _number(self, value: Any) -> Any:
         """A coefficient as a double, rounded once, or as a parameter."""
@@ -249,8 +261,10 @@ class Family:
         return [variable for _, variable in self._swept.values()]
 
     def doubles(self, value: Any) -> np.ndarray:
-        """A number of the scene for each member, rounded once, (members,)."""
-        return self._context.doubles(value)[self._chosen]
+        """One of the numbers of the scene that runs ask for, for each member, rounded once, (members,)."""
+        return (
+            self._doubles[id(value)] if isinstance(value, Swept) else np.full(len(self.members), value, float)
+        )
 
     def whole_numbers(self, value: Any) -> np.ndarray:
         """A whole number of the model for each member, (members,)."""
@@ -299,38 +313,60 @@ class Families:
 
     def sort(self) -> Sorted:
         """Sort all members."""
+        known = self._members.axes.known
         for first in range(0, self._members.count, _AT_ONCE):
             waiting = np.arange(first, min(first + _AT_ONCE, self._members.count))
+            for family in known:
+                waiting = self._without(waiting, family.kind, partial(self._join, family))
             while len(waiting) and len(self._sorted.refused) != self._most_refused:
-                kinds = self._members.kinds[waiting]
-                waiting = np.setdiff1d(waiting, self._take(waiting[kinds == kinds[0]]), assume_unique=True)
+                waiting = self._without(waiting, self._members.kinds[waiting[0]], self._take)
+        del known[:-_MOST_KNOWN]
         return self._sorted
+
+    def _without(
+        self, waiting: np.ndarray, kind: int, take: Callable[[np.ndarray], np.ndarray]
+    ) -> np.ndarray:
+        """Those still waiting after some of a kind were taken."""
+        candidates = waiting[self._members.kinds[waiting] == kind]
+        return np.setdiff1d(waiting, take(candidates), assume_unique=True) if len(candidates) else waiting
+
+    def _join(self, family: Family, candidates: np.ndarray) -> np.ndarray:
+        """Sort those of some members of a kind that share a family's equations; returns these."""
+        family.context.begin(self._members.columns(candidates), len(candidates))
+        return self._sort_in(family, candidates)
+
+    def _sort_in(self, family: Family, candidates: np.ndarray) -> np.ndarray:
+        part, taken = family.of(candidates), candidates[family.context.agree]
+        if len(part.members):
+            self._sorted.groups.append(part)
+        beyond = np.setdiff1d(taken, part.members).tolist()
+        self._sorted.alone |= dict.fromkeys(beyond, NotBatchable.RANGE)
+        return taken
 
     def _take(self, candidates: np.ndarray) -> np.ndarray:
         """Sort the first of some members of a kind, with all that share its equations; returns these."""
         found, first = self._sorted, int(candidates[0])
-        context = SweptContext(context_for("double"), len(candidates))
+        columns = self._members.columns(candidates)
+        context = SweptContext(context_for("double"), columns, len(candidates))
         try:
             experiment = self._members.experiment(first)
             reason = batchable(experiment, self._members.keys)
             if reason is None:
-                family = self._worked_out(experiment, candidates, context)
+                family = self._worked_out(experiment, first, context)
                 reason = _reason_of_system(family.prepared, family.system)
         except ConfigError as error:
             found.refused[first] = error
             return candidates[:1]
         except Untraceable:
             reason = NotBatchable.UNTRACEABLE
-        taken = candidates[context.agree]
-        alone = taken
         if reason is None:
-            alone, reason = np.setdiff1d(taken, family.members), NotBatchable.RANGE
-            if len(family.members):
-                found.groups.append(family)
-        found.alone |= dict.fromkeys(alone.tolist(), reason)
+            self._members.axes.known.append(family)
+            return self._sort_in(family, candidates)
+        taken = candidates[context.agree]
+        found.alone |= dict.fromkeys(taken.tolist(), reason)
         return taken
 
-    def _worked_out(self, experiment: Experiment, candidates: np.ndarray, context: SweptContext) -> Family:
+    def _worked_out(self, experiment: Experiment, first: int, context: SweptContext) -> Family:
         """The family of the first of some members.
 
         Raises:
@@ -341,17 +377,14 @@ class Families:
         plan, members = prepared.system.plan, self._members
         if plan.scaling.drive is not None:
             plan = replace(plan, scaling=replace(plan.scaling, drive=members.axes.drive))
-        columns = members.columns(candidates)
-        for key, number, column in zip(members.keys, members.exact(int(candidates[0])), columns, strict=True):
+        for place, (key, number) in enumerate(zip(members.keys, members.exact(first), strict=True)):
             path = Path.of(key)
             if not isinstance(path.get(config), ExactNumber):
                 raise Untraceable(f"what is swept, {key}, is no number")
-            config = path.with_number(
-                config, SweptExact(Swept(context, partial(np.asarray, column)), number), context
-            )
+            config = path.with_number(config, SweptExact(context.column(place), number), context)
         scene = build_scene(replace(experiment, config=config), context)
         check_start(scene)
-        return Family(prepared, scene, plan, candidates)
+        return Family(prepared, scene, plan, int(members.kinds[first]))
 
 
 # --- from the start to the last sample ----------------------------------------------------------------------
