@@ -224,6 +224,7 @@ class Family:
     members: np.ndarray
     initial: np.ndarray
     parameters: np.ndarray
+    _doubles: dict[int, np.ndarray]
 
     def __init__(self, prepared: InitialValueProblem, scene: Scene, like: ModelPlan, kind: int) -> None:
         self.prepared, self.context, self.kind = prepared, scene.context, kind
