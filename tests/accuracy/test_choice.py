@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 import xarray
-from support import cases, config, same_bits
+from support import cases, config, same_bits, unoptimised_code
 from support import run_estimated as run_text
 
 import rigidsim
@@ -168,6 +168,7 @@ ATTRACTORS = config(
 
 
 @pytest.mark.slow
+@unoptimised_code()
 def test_the_path_is_certified_and_right() -> None:
     run = run_text(ATTRACTORS, "integrator.accuracy_position=1e-6")
     accuracy = run.summary["accuracy"]

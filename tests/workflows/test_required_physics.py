@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import angles_between, config, parts_in
+from support import angles_between, config, parts_in, unoptimised_code
 from typer.testing import CliRunner
 
 import rigidsim
@@ -112,6 +112,7 @@ def test_no_cheaper_model_is_within_the_error(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@unoptimised_code()
 def test_the_written_config_runs_and_is_the_least_model(tmp_path: Path) -> None:
     text = satellite() + '[output]\nrecord = ["core_angular_velocity", "quaternion"]\n'
     with pytest.raises(rigidsim.RunFolderError, match="there is no folder"):
