@@ -228,10 +228,14 @@ class SweptContext:
     def begin(self, columns: Sequence[np.ndarray], members: int) -> None:
         """Take other members, and find those that decide everything as the first one of all did."""
         self._columns, self.agree = columns, np.ones(members, dtype=bool)
+        for decision in self._decided.values():
+            if self.agree.any():
+                self._follow(*decision)
+
+    def forget(self) -> None:
+        """Keep no number of these members; the next ones are worked out anew."""
         for number in self._known.values():
             number.forget()
-        for decision in self._decided.values():
-            self._follow(*decision)
 
     def column(self, place: int) -> Swept:
         """The swept number of a column."""

@@ -263,9 +263,9 @@ class Family:
 
     def doubles(self, value: Any) -> np.ndarray:
         """One of the numbers of the scene that runs ask for, for each member, rounded once, (members,)."""
-        return (
-            self._doubles[id(value)] if isinstance(value, Swept) else np.full(len(self.members), value, float)
-        )
+        if isinstance(value, Swept):
+            return self._doubles[id(value)]
+        return np.full(len(self.members), float(value))
 
     def whole_numbers(self, value: Any) -> np.ndarray:
         """A whole number of the model for each member, (members,)."""
@@ -337,11 +337,13 @@ class Families:
         return self._sort_in(family, candidates)
 
     def _sort_in(self, family: Family, candidates: np.ndarray) -> np.ndarray:
-        part, taken = family.of(candidates), candidates[family.context.agree]
-        if len(part.members):
-            self._sorted.groups.append(part)
-        beyond = np.setdiff1d(taken, part.members).tolist()
-        self._sorted.alone |= dict.fromkeys(beyond, NotBatchable.RANGE)
+        taken = candidates[family.context.agree]
+        if len(taken):
+            part = family.of(candidates)
+            self._sorted.groups += [part] if len(part.members) else []
+            beyond = np.setdiff1d(taken, part.members).tolist()
+            self._sorted.alone |= dict.fromkeys(beyond, NotBatchable.RANGE)
+        family.context.forget()
         return taken
 
     def _take(self, candidates: np.ndarray) -> np.ndarray:
