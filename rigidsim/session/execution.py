@@ -464,7 +464,7 @@ def summarise(run: "_ActiveRun", found: Diagnostics, spectrum: LyapunovSpectrum 
         accuracy=_accuracy(found),
         modelling=_modelling(found),
         tables=_tables(found),
-        **({} if (tides := _tides(found)) is None else {"tides": tides}),
+        **_tides(found),
         lyapunov=_lyapunov(found, spectrum),
         **understood(prepared, sizes=False),
         bit_for_bit=_bit_for_bit(prepared, progress, run.attributes.get("mixed_provenance")),
@@ -532,14 +532,10 @@ def _accuracy(found: Diagnostics) -> Accuracy:
     )
 
 
-def _tides(found: Diagnostics) -> str | None:
-    prepared = found.prepared
-    average = prepared.system.formulation.average
-    return (
-        None
-        if average is None
-        else average.tidal_words(prepared.scene, float(prepared.scene.end - prepared.scene.start))
-    )
+def _tides(found: Diagnostics) -> dict[str, Any]:
+    scene, average = found.prepared.scene, found.prepared.system.formulation.average
+    words = None if average is None else average.tidal_words(scene, float(scene.end - scene.start))
+    return {} if words is None else {"tides": words}
 
 
 def _tables(found: Diagnostics) -> dict[str, TableErrors]:

@@ -26,7 +26,7 @@ def runs_of(paths: Sequence[Path], members: Sequence[int] = ()) -> list[tuple[st
     """Runs with their names on the screen, each different; with ``members``, runs of one sweep."""
     if members:
         return _members(paths, members)
-    runs = [*map(shown, paths)]
+    runs: list[Run] = [*map(shown, paths)]
     names = [run.outcome.name for run in runs]
     if len(set(names)) < len(names):
         names = [run.place for run in runs]
