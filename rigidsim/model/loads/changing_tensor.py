@@ -207,8 +207,10 @@ class MovedMass(Load, Carrier):
                 there["t"] = values["t"]
                 try:
                     moments = [
-                        float(plain(evaluate(x, there, context) if isinstance(x, Expression) else x))
-                        for x in self.moments
+                        float(plain(evaluate(x, there, context)))
+                        if isinstance(x, Expression) and (driving or names_used(x) == {"t"})
+                        else now
+                        for x, now in zip(self.moments, begun, strict=True)
                     ]
                 except ExpressionError:
                     continue
