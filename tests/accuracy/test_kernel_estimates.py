@@ -2,7 +2,7 @@
 
 import pytest
 from kernel_scenes import moon, satellite
-from support import angle_between, assert_announced, config, loaded, run_estimated, run_text
+from support import angle_between, assert_announced, config, loaded, run_estimated, run_text, unoptimised_code
 
 START = (
     "euler_angles = [0.005, 0.382, 1.294]\n"
@@ -34,6 +34,7 @@ SCENES = [
 
 
 @pytest.mark.slow
+@unoptimised_code()
 def test_announced_errors_are_true() -> None:
     """The Moon with a core, without and in momenta, tumbling bodies and a flight, tight and loose."""
     truths = [

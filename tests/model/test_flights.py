@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from flights import MU, Flight, by_scipy, turned_by
-from support import run_estimated, run_text
+from support import run_estimated, run_text, unoptimised_code
 
 import rigidsim
 from rigidsim import ConfigError
@@ -17,6 +17,7 @@ IN_ORBIT = Flight(
 
 
 @pytest.mark.slow
+@unoptimised_code()
 def test_a_small_drag_leaves_the_attitude_as_right_as_announced() -> None:
     """The other integrator's own errors: 1e-13 of each of some thousand steps, over a hundred radians."""
     run, truth = run_estimated(IN_ORBIT.text), by_scipy(IN_ORBIT)

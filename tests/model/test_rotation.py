@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
-from support import cases, config, loaded, run_text
+from support import cases, config, loaded, run_text, unoptimised_code
 
 import rigidsim
 from rigidsim import ConfigError
@@ -89,6 +89,7 @@ def recorded_less_labelled(found: xr.Dataset) -> np.ndarray:
 
 
 @pytest.mark.slow
+@unoptimised_code()
 def test_the_label_is_what_is_recorded_in_all_hemispheres() -> None:
     """Starts with the momentum above and below the reference plane and the figure's equator."""
     random = np.random.default_rng(3)
