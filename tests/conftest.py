@@ -32,12 +32,14 @@ os.environ.update(COLUMNS="1000", TERM="xterm-256color", FORCE_COLOR="", TTY_COM
 def pytest_runtest_protocol(item: pytest.Function) -> Iterator[object]:
     """Tests run in code that compiles fast and rounds otherwise than that of real runs, since their
     statements hold whatever the last bit is; those marked ``optimised`` in the code of real runs, and long
-    ones, which step long. A further parameter of a short test runs as the others do.
+    ones, which step long, but for those marked ``unoptimised``. A further parameter of a short test runs as
+    the others do.
     """
     from support import unoptimised_code
 
     whole = [*getattr(item.function, "pytestmark", ()), *item.parent.iter_markers()]
     optimised = any(mark.name in ("optimised", "slow", "campaign") for mark in whole)
+    optimised = optimised and not item.get_closest_marker("unoptimised")
     with nullcontext() if optimised else unoptimised_code():
         return (yield)
 

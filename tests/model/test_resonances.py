@@ -11,6 +11,8 @@ import rigidsim
 from rigidsim import parse
 from rigidsim.solve.problem import InitialValueProblem, prepare
 
+pytestmark = pytest.mark.unoptimised
+
 MOMENTS = np.array([0.998, 0.999, 1.0])
 
 

@@ -12,6 +12,8 @@ import rigidsim
 from rigidsim import ConfigError
 from rigidsim.solve.problem import prepare
 
+pytestmark = pytest.mark.unoptimised
+
 AU, SUN, DAY = 149597870700.0, 1.32712440018e20, 86400.0
 MOTION = math.sqrt(SUN / AU**3)
 NODE, PERIAPSIS = 1.5e-8, 6e-8  # rad/s: the periapsis turns by 12 degrees in 40 days

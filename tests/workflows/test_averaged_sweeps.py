@@ -11,6 +11,8 @@ import rigidsim
 from rigidsim.cli.app import app
 from rigidsim.workflows.sweeps.members import single_member
 
+pytestmark = pytest.mark.unoptimised
+
 SPINNING = config(
     "principal_moments = [0.98, 0.98, 1]",
     'angular_velocity = [0, 0, 60]\neuler_angles = [0.3, "35 deg", 0]',

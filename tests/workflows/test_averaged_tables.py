@@ -10,6 +10,8 @@ from support import cases, config, run_text
 import rigidsim
 from rigidsim.solve.problem import prepare
 
+pytestmark = pytest.mark.unoptimised
+
 FLATTENING, SPIN, ECCENTRICITY = 0.02, 60.0, 0.2
 NODE, PERIAPSIS = 0.004, 0.006  # rad/s beside a mean motion of 1
 BODY = f"principal_moments = [{1 - FLATTENING}, {1 - FLATTENING}, 1]"

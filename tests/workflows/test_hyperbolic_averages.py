@@ -10,6 +10,8 @@ import rigidsim
 from experiments.coverage.families import FAMILIES, coverage_scene
 from experiments.coverage.hyperbolic import HYPERBOLIC
 
+pytestmark = pytest.mark.unoptimised
+
 AXES = ("momentum_axis", "figure_axis")
 RECORDED = "output.record=['momentum_axis','figure_axis']"
 # a share of the study, whose counts are in experiments/README.md

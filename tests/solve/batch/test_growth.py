@@ -9,6 +9,8 @@ from test_batch_lanes import FREE, ORBIT, PLANAR, TORQUE, blocks_of, by_member, 
 
 import rigidsim
 
+pytestmark = pytest.mark.unoptimised
+
 RATES = {"initial.angular_velocity[2]": "uniform = [0.3, 2.2], count = 9"}
 
 
