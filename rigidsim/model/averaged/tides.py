@@ -158,7 +158,7 @@ def tides_of(scene: Scene, sources: Sequence[Source], momentum: Any) -> Tides | 
     def fault(key: str, what: str) -> ConfigError:
         return ConfigError(Problem(f"[tides] {key}".rstrip(), what))
 
-    named = {load.name: n for n, load in enumerate(scene.config.loads, 1) if getattr(load, "name", None)}
+    named = {str(load.name): n for n, load in enumerate(scene.config.loads, 1) if getattr(load, "name", None)}
     known = {source.number: source for source in sources if source.motion > 0}
     moment, found = max(body.principal_moments), []
     spin = momentum / moment
