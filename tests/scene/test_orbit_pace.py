@@ -75,7 +75,7 @@ def test_a_table_takes_them_for_its_mean_longitude() -> None:
     table = f'[tables."t.csv"]\ntext = """\ntime, eccentricity, ascending_node\n{rows}\n"""\n'
     keys = 'table = "t.csv", semi_major_axis = 1, inclination = 0.3, mean_anomaly = 0.5'
     for pace in ("period = 5", "sidereal_period = 5", 'longitude_rate = "2 pi/5"'):
-        scene = build_scene(parse(SCENE.format(precision="double", orbit=f"{keys}, {pace}") + table))
+        scene = build_scene(parse(SCENE.format(precision="quadruple", orbit=f"{keys}, {pace}") + table))
         (load,) = scene.loads
         orbit, context = load.table, scene.context  # type: ignore[attr-defined]
         assert abs(orbit.mean_motion - 2 * context.pi / 5) < 1e-40
