@@ -13,6 +13,7 @@ from rigidsim.look.fits import secular
 from rigidsim.look.record import scene_of
 from rigidsim.look.signals import clock, in_words, is_averaged, need, optional
 from rigidsim.look.solids import Array, Color
+from rigidsim.scene.parts_of_values import BACKWARDS
 from rigidsim.scene.readable import DAY, angle_text, named_unit, scaled, turning_text, with_unit
 
 HUES: dict[str, tuple[str, Color]] = {
@@ -132,9 +133,14 @@ def uncertain(dataset: xarray.Dataset, values: Array, divisor: float) -> Array |
     error, finite = dataset.attrs.get("attitude_error"), values[np.isfinite(values)]
     if error is None or not len(finite) or not float(error) / divisor > _SEEN * float(np.ptp(finite)):
         return None
+    return np.asarray(float(error) / divisor * _share(dataset) ** 1.5)
+
+
+def _share(dataset: xarray.Dataset) -> Array:
+    """The share of the run until each row (rows,); a run that goes back begins at the last one."""
     seconds = np.asarray(dataset["time"].values, dtype=np.float64)
-    share = np.abs(seconds - seconds[0]) / (abs(seconds[-1] - seconds[0]) or 1.0)
-    return np.asarray(float(error) / divisor * share**1.5)
+    begin = seconds[-1] if dataset.attrs.get(BACKWARDS) else seconds[0]
+    return np.abs(seconds - begin) / (abs(seconds[-1] - seconds[0]) or 1.0)
 
 
 def drift_plot(dataset: xarray.Dataset) -> Plot | None:
@@ -161,11 +167,9 @@ def drift_plot(dataset: xarray.Dataset) -> Plot | None:
 def rounding_law(dataset: xarray.Dataset) -> Array | None:
     """tolerance sqrt(steps until then) (rows,), steps spread evenly over the run; None if there were none."""
     steps, tolerance = (float(dataset.attrs.get(name) or 0.0) for name in ("steps", "tolerance"))
-    seconds = np.asarray(dataset["time"].values, dtype=np.float64)
-    span = seconds[-1] - seconds[0]
-    if not (steps > 0 and tolerance > 0 and span):
+    if not (steps > 0 and tolerance > 0 and _share(dataset).any()):
         return None
-    return tolerance * np.sqrt(np.maximum(steps * (seconds - seconds[0]) / span, 1.0))
+    return tolerance * np.sqrt(np.maximum(steps * _share(dataset), 1.0))
 
 
 def other_plots(dataset: xarray.Dataset, shown: Sequence[str]) -> list[Plot]:
@@ -324,6 +328,24 @@ def _of_axes(dataset: xarray.Dataset, which: int) -> Found:
     said = {"more": f" less its mean motion, {rate}", "word": "longitude − line"}
     mean = {"more": f" less its mean, {angle_text(trend.value, 7)}", "word": "obliquity − mean"}
     return rest, options | (said if which else mean)
+
+
+def climatic(dataset: xarray.Dataset) -> Found:
+    """Climatic precession within the eccentricity."""
+    found, e = (
+        need(signals.values(dataset, "climatic_precession")),
+        signals.values(dataset, "orbit_eccentricity"),
+    )
+    if e is None:
+        return found
+    return np.stack([found, e], axis=1), {"labels": ("e sin ϖ", "eccentricity")}
+
+
+def obliquity_of_date(dataset: xarray.Dataset) -> Found:
+    """The figure axis' obliquity as it is."""
+    need("climatic_precession" in dataset or "insolation" in dataset)
+    table = need(signals.values(dataset, "obliquity"))
+    return table[:, list(dataset["axis"].values).index("figure")] if table.ndim == 2 else table
 
 
 def braking(dataset: xarray.Dataset) -> Found:
@@ -530,6 +552,11 @@ CURVES: dict[str, Curve] = {
     "longitude": row(
         "node_longitude", "Longitude of the node", partial(_of_axes, which=1), word="longitude", begins=True
     ),
+    "obliquity_of_date": row("obliquity", "Obliquity", obliquity_of_date, word="obliquity"),
+    "climatic": row(
+        "climatic_precession", "Climatic precession", climatic, of="", word="e sin ϖ", hues=("orange", "grey")
+    ),
+    "insolation": recorded("insolation", "Insolation", "insolation", hues=("red",)),
     "braking": row(
         "braking", "Remaining rotation", braking, of="", word="share of the start", from_zero=True,
         hues=("violet", "orange"),

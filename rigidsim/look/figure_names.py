@@ -9,6 +9,7 @@ FIGURES: dict[str, str] = {
     "pole_path": "path of the figure axis in space, and about its mean motion where that precesses",
     "nutation": "nutation ellipse: the pole about its mean motion",
     "obliquity": "obliquity and longitude of the node, less what would hide their swings",
+    "climate": "obliquity, climatic precession within the eccentricity, and insolation over time",
     "libration": "libration, or roll, pitch and yaw, over time; the source seen from the body",
     "pointing": "angle of a body axis from the oncoming air, or from the Sun or the planet, over time",
     "tip": "trace of a top's tip seen from above, its tilt and precession over time",

@@ -57,6 +57,11 @@ def leading(rows: xarray.Dataset) -> tuple[Names, Names]:
             ["rotor_tilts", "rotor_rates", "rates"],
             ["momentum_sphere", "momentum_sphere_at_end"],
         ),
+        (
+            lambda: shows("climatic") or shows("insolation"),
+            ["obliquity_of_date", "climatic", "insolation"],
+            [],
+        ),
         (  # its figure axis precesses, as the Moon's
             lambda: sources.librates(rows) and shows("latitude_libration"),
             ["longitude_libration", "latitude_libration", "libration"],

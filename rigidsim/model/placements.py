@@ -428,9 +428,7 @@ class PlacedInPlane(Placement):
         return [size * x for x in place]
 
     def seen(self, m: Kinematics) -> SourcePlace:
-        what = (
-            'given with node = "averaged", which has a plane and no place; only averages over orbits take it'
-        )
+        what = 'an orbit with node = "averaged" has a plane, but no place that a full motion could follow'
         raise ConfigError(Problem("[[loads]] plane_of", what))
 
     def circuit(self, context: Any) -> Circuit:

@@ -18,9 +18,14 @@ def parts_in(dataset: "xarray.Dataset", name: str) -> list[str]:
     return [name, *takewhile(lambda residual: "residual_of" in dataset[residual].attrs, residuals)]
 
 
+BACKWARDS = "backwards"
+
+
 def in_time_order(dataset: "xarray.Dataset") -> "xarray.Dataset":
-    """The dataset with ascending times: the rows of a run that goes backwards are reversed, lazily."""
+    """The dataset with ascending times: the rows of a run that goes backwards are reversed, lazily, and its
+    attribute ``BACKWARDS`` says so.
+    """
     times = dataset.coords.get("time")
     if times is None or times.dims != ("time",) or len(times) < 2 or not times[0] > times[-1]:
         return dataset
-    return dataset.isel(time=slice(None, None, -1))
+    return dataset.isel(time=slice(None, None, -1)).assign_attrs({BACKWARDS: 1})

@@ -41,7 +41,7 @@ SUBJECTS: Mapping[str, tuple[str, ...]] = {
         "earth_precession_averaged",
         "earth_moon_sun", "moon_cassini_state", "moon_mean_axis", "young_moon", "mars_precession",
         "mars_with_table",
-        "mars_obliquity", "phobos_libration", "vesta_nutation",
+        "mars_obliquity", "earth_deep_time", "phobos_libration", "vesta_nutation",
     ),
     "Under JPL's ephemerides (pip install 'rigidsim[ephemeris]')": (
         "moon_since_1969", "rigid_moon", "rigid_earth_nutation", "mars_nutation", "mercury_libration",
@@ -69,6 +69,7 @@ ALIASES: Mapping[str, str] = {
     "lagrange": "heavy_top_nutating",
     "mars": "mars_precession",
     "mercury": "mercury_libration",
+    "milankovitch": "earth_deep_time",
     "phobos": "phobos_libration",
     "sail": "sun_pointing_sail",
     "shuttlecock": "aerostable_cubesat",

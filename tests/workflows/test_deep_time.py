@@ -273,7 +273,7 @@ def test_the_error_of_an_average_over_the_node_is_reported_as_unknown(config: Pa
     )
     run = rigidsim.run(config, out=None)
     assert run.summary["modelling"]["unmeasured"] == "full_refused"
-    assert "which has a plane and no place" in run.summary["modelling"]["how"]
+    assert "has a plane, but no place" in run.summary["modelling"]["how"]
 
 
 @pytest.mark.campaign

@@ -393,6 +393,9 @@ KINDS: dict[str, Kind] = {
     "pole_path": Kind(_AXIS, (), ["pole_path", "nutation"]),
     "nutation": Kind("a pole that a torque moves, within half a radian of its mean motion", (), ["nutation"]),
     "obliquity": Kind(_AXIS, ["obliquity", "longitude"]),
+    "climate": Kind(
+        "climatic_precession or insolation recorded", ["obliquity_of_date", "climatic", "insolation"]
+    ),
     "libration": Kind(
         "libration, roll_pitch_yaw, nadir or source_position recorded",
         ["longitude_libration", "latitude_libration", "locking", "libration", "roll_pitch_yaw"],
