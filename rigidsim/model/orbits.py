@@ -143,6 +143,13 @@ class Pieces:
         pairs = ((self.series[place].states, values) for place, values in self.changes(number))
         return {name: value for names, values in pairs for name, value in zip(names, values, strict=True)}
 
+    def begun(self, number: int) -> tuple[np.ndarray, list[tuple[int, np.ndarray]]]:
+        """Parameters of a piece, and the changes where it begins."""
+        if number and len(self.series) == 1:
+            parameters, values = self._of(0, number)
+            return parameters, [(0, values)]
+        return self.parameters(number), self.changes(number)
+
     def changes(self, number: int) -> list[tuple[int, np.ndarray]]:
         """The same as arrays, with the number of the series in ``series`` that each belongs to."""
         if number and len(self.series) == 1:
@@ -497,7 +504,7 @@ def _unit(orbit: TabulatedOrbit, element: str) -> Any:
 class TablePieces(PieceSeries):
     """Pieces of one table, which begin at its rows (see ``rigidsim.model.orbits.PieceSeries``)."""
 
-    at_once = 256
+    at_once = 1024
 
     def __init__(
         self, orbit: TabulatedOrbit, place: TablePlace, scaling: Scaling, start: Any, number: Rounder

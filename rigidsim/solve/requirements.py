@@ -63,7 +63,8 @@ class SetAtKnots(Requirement):
     def __init__(self, system: System) -> None:
         assert system.pieces is not None
         self.pieces = system.pieces
-        self._places = [[system.states.index(name) for name in x.states] for x in self.pieces.series]
+        places = ([system.states.index(name) for name in x.states] for x in self.pieces.series)
+        self._places = [np.array(place) for place in places]
         self._entered: tuple[int, int] | None = None
         self._equal = _equal_pieces(self.pieces.knots)
 
@@ -75,22 +76,19 @@ class SetAtKnots(Requirement):
         if number and high == pieces.knots[number - 1]:
             if low != 0:
                 integrator.dtime = (high, high * 0)
-            self._begin(integrator, number)
+            self._change(integrator, pieces.changes(number))
         return number
 
-    def _begin(self, integrator: TaylorEngine, number: int) -> None:
-        for series, values in self.pieces.changes(number):
+    def _change(self, integrator: TaylorEngine, changes: list[tuple[int, np.ndarray]]) -> None:
+        for series, values in changes:
             integrator.state[self._places[series]] = values
 
     def meet(self, integrator: TaylorEngine) -> Scalar | None:
         number = self.enter(integrator)
-        self._set(integrator, number)
-        return self._end(number)
-
-    def _set(self, integrator: TaylorEngine, number: int) -> None:
         if self._entered != (number, id(integrator)):
             integrator.pars[:] = self.pieces.parameters(number)
             self._entered = (number, id(integrator))
+        return self._end(number)
 
     def end_after(self, time: Scalar) -> Scalar | None:
         return self._end(self.pieces.number_at(time))
@@ -108,8 +106,10 @@ class SetAtKnots(Requirement):
             nonlocal number
             if engine.time != knots[number - 1]:
                 return False
-            self._begin(engine, number)
-            self._set(engine, number)
+            parameters, changes = self.pieces.begun(number)
+            self._change(engine, changes)
+            engine.pars[:] = parameters
+            self._entered = (number, id(engine))
             number += 1
             return True
 

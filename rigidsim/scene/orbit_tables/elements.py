@@ -101,15 +101,18 @@ def _numbers(
     table: TextTable, names: list[str], context: Any, *, narrow: bool
 ) -> tuple[list[int], np.ndarray]:
     """Numbers of the lines, and the numbers in them (rows, columns) as they are written."""
-    rows = [(number, [table.plain(cell) for cell in cells]) for number, cells in table.rows()]
+    rows = list(table.rows())
     flat = [cell for _, cells in rows for cell in cells]
     found = None
-    if narrow and _IN_DECIMALS.issuperset("".join(flat)):
+    if "," in (text := "".join(flat)):
+        flat = [table.plain(cell) for cell in flat]
+        text = "".join(flat)
+    if narrow and _IN_DECIMALS.issuperset(text):
         with suppress(ValueError):  # the line at fault is found below
             found = np.array(flat, dtype="S").astype(np.longdouble)
     if found is None or not np.isfinite(found).all():
         for number, cells in rows:
-            for name, cell in zip(names, cells, strict=True):
+            for name, cell in zip(names, map(table.plain, cells), strict=True):
                 if len(cell) > _LONGEST_CELL or _DECIMAL.fullmatch(cell) is None:
                     raise TableError(f"line {number}: given {shown(cell)} as {name}; a decimal number is "
                                      "allowed, without a unit (the line of names has it)")  # fmt: skip
