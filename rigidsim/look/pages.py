@@ -22,6 +22,7 @@ _PARTS, _SLOWER = 10, 1.5  # parts of a run whose mean rates differ so many time
 _AT_REST = 1e-3  # of its largest rate, below which a body doesn't turn
 _REGULAR = 0.05  # by which swings may differ that have one period
 _FROM_TO = {
+    "obliquity_of_date": "obliquity", "climatic": "{}", "insolation": "insolation",
     "tilt": "tilt", "wobble": "nutation angle", "pointing": "pointing error", "roll_pitch_yaw": "{}",
     "libration": "libration {}", "rotor_tilts": "axis of rotor {} off L",
     "rotor_rates": "rate of rotor {}", "braking": "remaining {}", "core_axis": "core axis from the mantle's",
