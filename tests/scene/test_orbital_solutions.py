@@ -113,6 +113,8 @@ def test_each_program_s_file_is_the_same_orbit(seed: int, frame: str) -> None:
         wanted = plane_and_pericentre(seed, ROWS - 1 - row)
         for found, expected in zip(vectors(table, row), wanted, strict=True):
             np.testing.assert_allclose(found, rotation @ expected, rtol=0, atol=2e-14)
+        normal = np.array(table.normal(table.time(row)), dtype=float)
+        np.testing.assert_allclose(normal, rotation @ wanted[0], rtol=0, atol=2e-14)
     assert abs(float(table.time(ROWS - 1))) == 0
     assert float(table.row(3)["axis"]) == pytest.approx(1.000001 * 149597870700, rel=1e-15)
 

@@ -41,6 +41,8 @@ def test_convergence_is_in_the_dataset(runs: Path) -> None:
     assert float(run.dataset["lyapunov_time"][-1]) == pytest.approx(200.0, rel=1e-12)
     assert (np.diff(estimates.values, axis=1) <= 0).all()
     assert float(estimates[-1, 0]) == run.summary["lyapunov"]["largest_exponent"]
+    assert run.summary["lyapunov"]["chaotic"]
+    assert run.summary["lyapunov"]["e_folding_seconds"] == 1 / run.summary["lyapunov"]["largest_exponent"]
 
 
 def test_a_free_body_is_regular() -> None:
