@@ -27,6 +27,20 @@ CHAOTIC = config(
 )
 
 
+def test_a_quaternion_and_its_opposite_are_one_attitude() -> None:
+    """Attitudes 1e-20 to 1e-12 rad apart, from two parts of float64 each; half of them of opposite sign."""
+    random = np.random.default_rng(5)
+    one = random.normal(size=(20, 4))
+    one /= np.linalg.norm(one, axis=1)[:, None]
+    across = random.normal(size=(20, 4))
+    across -= np.sum(across * one, axis=1)[:, None] * one
+    angles = 10.0 ** random.uniform(-20, -12, size=20)
+    small = across / np.linalg.norm(across, axis=1)[:, None] * (angles / 2)[:, None]
+    signs = np.where(np.arange(20) % 2, 1.0, -1.0)[:, None]
+    found = angles_between([one, np.zeros_like(one)], [signs * one, signs * small])
+    np.testing.assert_allclose(found, angles, rtol=1e-12)
+
+
 def experiment(text: str, accuracy: Any, end: Any, *more: str, samples: int = 5) -> rigidsim.Experiment:
     settings = [f"time.end={end}", f"time.samples={samples}", f"integrator.accuracy={accuracy}"]
     return rigidsim.parse(text, overrides=[*settings, "output.timeline=false", *more])
