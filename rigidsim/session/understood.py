@@ -6,8 +6,8 @@ from typing import Any
 from rigidsim.model.formulations.formulation import ModelPlan
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.load_estimate import effects_at_start
-from rigidsim.model.loads.gravity import UniformGravity
-from rigidsim.model.placements import FlownByKernel
+from rigidsim.model.loads.gravity import Placed, UniformGravity
+from rigidsim.model.placements import FlownByKernel, PlacedInPlane
 from rigidsim.model.plausibility import (
     about_load,
     about_named_strength,
@@ -108,7 +108,7 @@ def load_descriptions(prepared: InitialValueProblem, *, sizes: bool = True) -> t
         name = getattr(given, "name", None)
         said.append(f"{what} {name}: {_value(given)}" if name else f"{what}: {_value(given)}")
         said[-1] += f"; {load.remark}" if load.remark else ""
-        place = load.source_at_start(scene) if sizes and number in placed else []
+        place = load.source_at_start(scene) if sizes and number in placed and not _only_in_plane(load) else []
         acting = [f"{kind} {number_text(size, _DIGITS)} {unit}" for kind, size, unit in effects[number]]
         if at_start := [*_seen(place, scene), *acting]:
             said[-1] += f"; at the start {', '.join(at_start)}"
@@ -124,11 +124,19 @@ def _seen(place: Vector, scene: Scene) -> Iterator[str]:
 
 
 def _together(plan: ModelPlan, load: Load) -> list[Load]:
-    """A load with what acts beside it, whose torque and force are shown; none of long series."""
+    """A load with what acts beside it, whose torque and force are shown.
+
+    Nothing of long series, or of a source whose place isn't known.
+    """
     together = [x for x in plan.loads if load is x or load is x.beside]
     if load.uniform_field is not None:  # all of which are one load
         together = [x for x in plan.loads if isinstance(x, UniformGravity)]
-    return [] if any(x.wide for x in together) else together
+    return [] if any(x.wide or _only_in_plane(x) for x in together) else together
+
+
+def _only_in_plane(load: Load) -> bool:
+    """Whether its source has a moving plane, but no place on it."""
+    return isinstance(load, Placed) and isinstance(load.placement, PlacedInPlane)
 
 
 def _value(value: Any) -> str:

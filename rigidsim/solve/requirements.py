@@ -95,10 +95,12 @@ class SetAtKnots(Requirement):
 
     def far(self, begin: tuple[Scalar, Scalar], end: Scalar, until: Scalar | None) -> Far | None:
         knots, number = self.pieces.knots, self.pieces.number_at(end)
-        last = min(self._equal[number - 1], number - 1 + _MOST_PIECES) if len(self._equal) else 0
+        if number < 2 or not len(self._equal) or begin != (knots[number - 2], 0):
+            return None
+        last = min(self._equal[number - 1], number - 1 + _MOST_PIECES)
         while last >= number and until is not None and knots[last] > until:
             last -= 1
-        if last < number or number < 2 or begin != (knots[number - 2], 0):
+        if last < number:
             return None
 
         def passed(engine: TaylorEngine) -> bool:

@@ -8,6 +8,8 @@ from scipy.integrate import solve_ivp
 from support import loaded
 
 import rigidsim
+from rigidsim.accuracy.reversal import there_and_back
+from rigidsim.workflows.check import check
 
 YEAR = 365.25 * 86400
 ARCSEC = np.pi / 648000
@@ -273,6 +275,27 @@ def test_the_error_of_an_average_over_the_node_is_reported_as_unknown(config: Pa
     run = rigidsim.run(config, out=None)
     assert run.summary["modelling"]["unmeasured"] == "full_refused"
     assert "has a plane, but no place" in run.summary["modelling"]["how"]
+
+
+def test_a_check_shows_no_place_of_a_moon_that_has_only_a_plane(config: Path) -> None:
+    config.write_text(with_moon(config, "linear", ["moon"], 1.0))
+    found = check(config)
+    assert found.valid
+    sun, moon = found.loads
+    assert "at the start source" in sun
+    assert "at the start" not in moon
+
+
+@pytest.mark.parametrize("years", [200, 400, 3000])
+def test_the_past_returns_to_the_present(config: Path, years: float) -> None:
+    """Within a row of a table that ends at the present, over one exactly, and over some."""
+    table = config.parent / "orbit.csv"
+    names, *rows = table.read_text().splitlines(keepends=True)
+    table.write_text("".join([names, *(row for row in rows if float(row.split(",")[0]) <= 0)]))
+    found = there_and_back(rigidsim.load(config, overrides=[f'time={{end="-{years} yr", samples=2}}']))
+    assert found.attitude is not None
+    assert found.announced is not None
+    assert found.attitude <= found.announced
 
 
 @pytest.mark.campaign
