@@ -31,7 +31,7 @@ CLOSEST = 0.6  # bins between lines below which Newton's method can't separate t
 # of the error of a secular rate, see ``hidden_rate``
 _DEGREE = 9  # of the polynomial in the slow part: a line of one turn in the samples to some 1e-4
 _NEAR = 30.0  # bins from zero within which lines may be pieces of the slow part
-_PIECE = 0.1  # of what is left, above which a line is one of its own; pieces were 1e-4 to 3e-2
+_PIECE = 0.1  # of the residual, above which a line is separate; pieces were 1e-4 to 3e-2
 _SURE = 4.0  # standard deviations above which something is there
 _CELLS = 4096
 _STRAIGHT = 1e-3  # k, in half lengths, below which rounding hides how exponentials differ from polynomials

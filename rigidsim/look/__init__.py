@@ -11,7 +11,7 @@ rerun, `figures` matplotlib. All else is numbers and texts, for both.
 | `record`, `signals` | the recorded scene of a dataset; its quantities and times |
 | `curves`, `paths` | what is drawn over time, and in planes, in one form for both |
 | `pages` | what a scene shows first, its numbers in words, pages of text |
-| `stages` | stages by kind of scene, as entities of rerun; a package of its own |
+| `stages` | stages by kind of scene, as entities of rerun; a separate package |
 | `sources`, `gyrostats` | what pulls at a body, and librations; bodies with rotors |
 | `fits` | secular parts, periods and ellipses, by ``analysis`` |
 | `thinning` | a bounded number of a dataset's rows |

@@ -30,7 +30,7 @@ HUES: dict[str, tuple[str, Color]] = {
 """Colours by name: on paper, and on the dark ground of the screen."""
 XYZ = ("red", "green", "blue")
 PALETTE = ("blue", "orange", "violet", "green", "red", "teal", "brown", "grey", "pink")
-_STILL = 1e-9  # of a curve's size, or of an angle's growth, below which what is left is rounding
+_STILL = 1e-9  # of a curve's size, or of an angle's growth, below which the rest is rounding
 _SEEN = 2e-3  # of a curve's range: a narrower band is no wider than the line
 _MOST_CURVES = 16  # of one variable, so that a recorded matrix history stays readable
 TYPICAL, MOST = 0.5, 50.0

@@ -62,7 +62,7 @@ class Part:
         values: (rows, ...) of what changes, or of what stands, in units of the stage.
         words, color: in the legend, if there are words.
         stride: between rows that are drawn; only: the rows that are drawn, if not those.
-        lasting: rows in the bright end of a trail; 0 for those of any other; None of what is no trail.
+        lasting: rows in the bright end of a trail; 0 for any other trail; None of anything else.
     """
 
     path: str
@@ -174,7 +174,7 @@ def arrow(
         return [*rr.Arrows3D.columns(vectors=drawn), *tip]
 
     static: list[rr.AsComponents] = [rr.Arrows3D.from_fields(colors=[color], radii=[radius])]
-    if label:  # of the same entity: one of its own would repeat every time
+    if label:  # of the same entity: a separate label would repeat every time
         named: dict[str, Any] = {"labels": [label], "show_labels": True}
         static.append(rr.Points3D.from_fields(colors=[color], radii=[ball], **named))
     stride = _stride_of(vectors, _STILL)

@@ -20,7 +20,7 @@ anomaly f, the mean anomaly M, P and T the unit vectors to pericentre and across
 with <cos k f> = (-b)^k (1 + k sqrt(1 - e^2)), b = e / (1 + sqrt(1 - e^2)). The nutation with the orbit's
 period is k (J s) x s then, and s is the mean direction (the first order of Kinoshita 1977).
 
-To second order the mean turns by <DF u> besides, with F what is left of s' and u the nutation. Both have
+To second order the mean turns by <DF u> besides, with F the rest of s' and u the nutation. Both have
 potentials, h = k s . (Q - <Q>) s / 2 and H = k s . J s / 2 with s' = grad h x s, so that it is grad K x s,
 
     K = <s . (grad h x grad H)> / 2 = (k^2 / 4) z (c0 (x^2 - y^2) + c1 (x^2 + y^2)),
@@ -469,7 +469,7 @@ class AnomalySums:
         )
 
     def integral(self, values: np.ndarray) -> np.ndarray:
-        """Integral over time of (.., n, 3) less the mean, without a mean of its own."""
+        """Integral over time of (.., n, 3) less the mean, with zero mean."""
         order = np.fft.fftfreq(values.shape[-2], 1 / values.shape[-2])[:, None] / self.turns
         order[0] = 1.0
         waves = np.fft.fft(values, axis=-2)

@@ -61,7 +61,7 @@ class AveragedMechanics(Mechanics):
         """See ``Kinematics``; here a function of time, without states.
 
         The digits that the phase loses as time goes on shift the direction only in proportion to the
-        nutation, and a torque without states of its own allows steps twice as long.
+        nutation, and a torque without states allows steps twice as long.
         """
         e = orbit.eccentricity
         shape = () if orbit.circular else (e, self.scene.context.sqrt(1 - e * e))

@@ -1,7 +1,7 @@
 """What changes the body's tensor of inertia: mass that moves, and elasticity.
 
 **Mass that moves**: principal moments as expressions of time and user-defined states. What moves does so
-symmetrically: it carries no momentum of its own relative to the body axes, and leaves the centre of mass
+symmetrically: it carries no momentum relative to the body axes, and leaves the centre of mass
 where it is. With I(t) in the body axes
 
     L = I w,    I w' = (I w) x w - I' w + N,    T = w . I w / 2,    T' = w . N - w . I' w / 2

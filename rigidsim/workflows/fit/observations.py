@@ -494,7 +494,7 @@ class FitKeys:
 
     def _one(self, varied: VariedKey) -> FitKey:
         suffix, unit, given = "", varied.unit, self._parameter(varied)
-        if given is not None and given.unit:  # constants of expressions have units of their own
+        if given is not None and given.unit:  # constants of expressions have separate units
             found = unit_text(powers(given.unit)) or "rad"
             suffix = unit = f"rad{found[1:]}" if found.startswith("1/") else found
         places = tuple(str(place) for place in varied.places)
