@@ -223,6 +223,8 @@ class Placement:
         sights: bodies of a kernel that it is placed by, see ``SceneLoad``.
         falling: of one seen from an origin that the source accelerates, its place from there.
         untracked: why velocity and acceleration aren't known; empty if they are, by ``motion``.
+        node_averaged: eccentricity and mean motion (rad/s) of an orbit averaged over its node, which has a
+            plane but no place; None for others.
     """
 
     name: str = ""
@@ -244,6 +246,15 @@ class Placement:
     sights: tuple[tuple[RelativeEphemeris, int], ...] = ()
     falling: Placement | None = None
     untracked: str = "only its place is known"
+    node_averaged: tuple[Any, Any] | None = None
+
+    def elements(self) -> tuple[KeplerOrbit | None, TabulatedOrbit | None]:
+        """The prescribed elements whose plane it moves in."""
+        return self.orbit, self.table
+
+    def node_factor(self, context: Any) -> Any:
+        """What averaging over a node makes of the mean torque; 1 without one."""
+        return context.one
 
     def seen(self, m: Kinematics) -> SourcePlace:
         """Where it is."""
@@ -407,9 +418,15 @@ class PlacedInPlane(Placement):
 
     @property
     def plane(self) -> OrbitPlane:  # type: ignore[override]
-        if self.reference.table is not None:
-            return table_plane(self.reference.table)
-        return kepler_plane(required(self.reference.orbit))
+        orbit, table = self.elements()
+        return kepler_plane(required(orbit)) if table is None else table_plane(table)
+
+    @property
+    def node_averaged(self) -> tuple[Any, Any]:  # type: ignore[override]
+        return self.eccentricity, self.mean_motion
+
+    def elements(self) -> tuple[KeplerOrbit | None, TabulatedOrbit | None]:
+        return self.reference.elements()
 
     def node_factor(self, context: Any) -> Any:
         """(3 cos^2 i - 1) / 2, of the mean of n n^T over the node along the plane's normal."""

@@ -7,7 +7,7 @@ from rigidsim.model.formulations.formulation import ModelPlan
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.load_estimate import effects_at_start
 from rigidsim.model.loads.gravity import Placed, UniformGravity
-from rigidsim.model.placements import FlownByKernel, PlacedInPlane
+from rigidsim.model.placements import FlownByKernel
 from rigidsim.model.plausibility import (
     about_load,
     about_named_strength,
@@ -136,7 +136,7 @@ def _together(plan: ModelPlan, load: Load) -> list[Load]:
 
 def _only_in_plane(load: Load) -> bool:
     """Whether its source has a moving plane, but no place on it."""
-    return isinstance(load, Placed) and isinstance(load.placement, PlacedInPlane)
+    return isinstance(load, Placed) and load.placement.node_averaged is not None
 
 
 def _value(value: Any) -> str:

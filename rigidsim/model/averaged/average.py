@@ -63,7 +63,6 @@ from rigidsim.model.averaged.tides import Tides, described, tides_of
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Carrier, Mechanics, carried_beside
 from rigidsim.model.orbits import Carried
-from rigidsim.model.placements import PlacedInPlane
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling, scaled_numbers
 from rigidsim.model.state_blocks import BODY
@@ -106,7 +105,7 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
     odd = [load.title for load in alone if not reads_rates_alone(load)]
     kinks = surfaces_of(scene).found if alone and not odd else []
     places = [source.placement for source in sources if over_orbits]
-    unsuited = [x.name for x in places if not (x.orbit or x.table or x.rests or isinstance(x, PlacedInPlane))]
+    unsuited = [x.name for x in places if not (any(x.elements()) or x.rests)]
     said = [
         (scene.free_flight, "the body has a position and flies", ""),
         (carried_beside(loads), carried_beside(loads), ""),
@@ -849,8 +848,8 @@ class Average:
         context, rates = scene.context, dict[int, float]()
         for source in self.sources:
             placed, e = source.of.placement, source.eccentricity
-            node = float(placed.node_factor(context)) if isinstance(placed, PlacedInPlane) else 1.0
-            rates[source.number] = float(self.rate(source)) / 2 * (1 - e * e) ** -1.5 * node
+            rate = float(self.rate(source) * placed.node_factor(context))
+            rates[source.number] = rate / 2 * (1 - e * e) ** -1.5
         cosine = float(dot(on_orbit[0].normal(context, scene.start), self.start))
         return described(self.tides, rates, cosine, seconds)
 

@@ -31,7 +31,6 @@ from rigidsim.model.frames import refuse_without_plane
 from rigidsim.model.load import Load, Term
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.orbits import ElementStates, OrbitStates, element_states
-from rigidsim.model.placements import PlacedInPlane
 from rigidsim.model.rotations import Symbolic, apply, quaternion_kinematics, quaternion_matrix
 from rigidsim.model.scaling import Rounder, choose_scaling
 from rigidsim.model.state_blocks import AttitudeStates, StateBlock
@@ -129,9 +128,9 @@ class AveragedMechanics(Mechanics):
         if source.of.table is not None:
             return OrbitTerms.of_elements(self._elements[source.of.table], self.number)
         context, placed = self.scene.context, source.of.placement
-        if isinstance(placed, PlacedInPlane):
-            e = placed.eccentricity
-            ellipse = Ellipse(e, e * e, context.sqrt(1 - e * e), placed.mean_motion * self.unit, bool(e == 0))
+        if placed.node_averaged is not None:
+            e, motion = placed.node_averaged
+            ellipse = Ellipse(e, e * e, context.sqrt(1 - e * e), motion * self.unit, bool(e == 0))
             return OrbitTerms(ellipse, self.normal(source), None, context.one, self.number)
         orbit = self.carried(source.of.orbit)
         ellipse = Ellipse.of(context, orbit)
@@ -178,40 +177,37 @@ class AveragedMechanics(Mechanics):
     def _geodetic(self) -> list[list[Symbolic]]:
         """Rates at which space turns along the body's orbits, if asked for, per internal unit of time:
         3/2 G M n / (c^2 a (1 - e^2)) about the orbit's normal (de Sitter 1916; Misner, Thorne & Wheeler 1973,
-        eq. 40.33).
+        eq. 40.33), with the mean n and a of a table and the e of the moment.
         """
         found = []
         for source in self.average.sources if self.scene.config.model.geodetic_precession else ():
-            if source.has_elements:
-                context = self.scene.context
-                ellipse = source.ellipse(context, self.scene.start)
-                strength = source.of.gravitational_parameter / source.of.placement.distance(context)
-                size = 3 * strength * ellipse.motion / (2 * _LIGHT**2 * (1 - ellipse.square))
-                table = source.of.table
-                seen = self.orbit(self.carried(source.of.orbit)) if table is None else self.table(table)
-                factor = as_factor(self.number(size * self.unit))
-                found.append([factor * x for x in seen.normal])
+            if not source.has_elements:
+                continue
+            orbit, table, context = source.of.orbit, source.of.table, self.scene.context
+            motion, axis = required(table or orbit).mean_motion, source.of.placement.distance(context)
+            size = 3 * source.of.gravitational_parameter * motion / (2 * _LIGHT**2 * axis) * self.unit
+            if orbit is not None:
+                factor = as_factor(self.number(size / (1 - orbit.eccentricity**2)))
+            else:
+                k, h = required(self.table(required(table)).eccentric)
+                factor = as_factor(self.number(size)) / (1.0 - (k * k + h * h))
+            found.append([factor * x for x in self.normal(source)])
         return found
 
     def _secular(self, source: Source) -> list[Symbolic]:
         """Secular pull -(k/2) (1 - e^2)^(-3/2) (n . s) n to second order; the pull of a source at rest."""
         placed = source.of.placement
-        if not source.has_elements and not isinstance(placed, PlacedInPlane):
+        if not source.has_elements and placed.node_averaged is None:
             return self._pull_of(source, self.direction)
-        rate, growth = self.average.rate(source) * self.unit, None
+        rate, growth = self.average.rate(source) * self.unit * placed.node_factor(self.scene.context), None
         if self.average.tides is not None:
             growth = self.average.tides.growth(self, source)
-        if isinstance(placed, PlacedInPlane):
-            rate = rate * placed.node_factor(self.scene.context)
         return self._terms(source).secular(rate, self.direction, second=self._second, growth=growth)
 
     def normal(self, source: Source) -> list[Symbolic]:
         """Normal of the plane of a source's orbit, space axes."""
-        placed = source.of.placement
-        placed = placed.reference if isinstance(placed, PlacedInPlane) else placed
-        return (
-            self._normal(required(placed.orbit)) if placed.table is None else self.table(placed.table).normal
-        )
+        orbit, table = source.of.placement.elements()
+        return self._normal(required(orbit)) if table is None else self.table(table).normal
 
     def _pull(self, s: list[Symbolic]) -> list[Symbolic]:
         """G s, the sum of k (a/r)^3 (s . r) r, per internal unit of time; s' is its cross product with s."""
