@@ -608,5 +608,5 @@ def _geodetic(scene: Scene) -> list[tuple[str, str]]:
             strength = float(plain(source.gravitational_parameter))
             rates.append(1.5 * strength**1.5 / (_LIGHT**2 * distance**2.5))
     size = max(rates) * abs(float(scene.samples.last - scene.start)) * ARCSEC
-    why = f"the equations have none; a free axis would turn by some {size:.2g} arcsec over the span, one "
-    return [("geodetic precession", why + "locked to its orbit by none")] if size else []
+    why = f"the equations have none; a free axis would turn by some {size:.2g} arcsec over the span, "
+    return [("geodetic precession", why + "an axis locked to its orbit not at all")] if size else []

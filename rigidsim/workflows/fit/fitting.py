@@ -474,7 +474,7 @@ def _direction_text(keys: Sequence[FitKey], values: np.ndarray, amounts: np.ndar
     relative = np.divide(amounts, values, out=np.full(len(keys), np.nan), where=values != 0)
     names = " and ".join([", ".join(one.key for one in keys[:-1]), keys[-1].key])
     if np.isfinite(relative).all() and np.ptp(relative) < 1e-3 * np.abs(relative).max():
-        return f"{names}: only their ratios show"
+        return f"{names}: only their ratios are determined"
     changes = ", ".join(f"{one.key} by {x:.3g}" for one, x in zip(keys, amounts, strict=True))
     return f"{names}: changed together ({changes}) they leave all rows as they are"
 
