@@ -58,7 +58,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
@@ -143,12 +143,21 @@ class Pieces:
         pairs = ((self.series[place].states, values) for place, values in self.changes(number))
         return {name: value for names, values in pairs for name, value in zip(names, values, strict=True)}
 
-    def begun(self, number: int) -> tuple[np.ndarray, list[tuple[int, np.ndarray]]]:
-        """Parameters of a piece, and the changes where it begins."""
-        if number and len(self.series) == 1:
-            parameters, values = self._of(0, number)
-            return parameters, [(0, values)]
-        return self.parameters(number), self.changes(number)
+    def following(self, number: int) -> Iterator[tuple[Any, np.ndarray, list[tuple[int, np.ndarray]]]]:
+        """Of a piece and all that come after it: where it begins, its parameters, and the changes there; at
+        last a knot that nothing reaches.
+        """
+        while number <= len(self.knots):
+            if len(self.series) > 1:
+                yield self.knots[number - 1], self.parameters(number), self.changes(number)
+                number += 1
+            else:
+                parameters, states, row = self._group(0, number)
+                knots = self.knots[number - 1 : number - 1 + len(parameters) - row]
+                for knot, values, changed in zip(knots, parameters[row:], states[row:], strict=True):
+                    yield knot, values, [(0, changed)]
+                number += len(knots)
+        yield math.inf, np.zeros(0), []
 
     def changes(self, number: int) -> list[tuple[int, np.ndarray]]:
         """The same as arrays, with the number of the series in ``series`` that each belongs to."""
@@ -163,6 +172,11 @@ class Pieces:
 
     def _of(self, place: int, own: int) -> tuple[np.ndarray, np.ndarray]:
         """Parameters, and values of states, of one part's own piece."""
+        parameters, states, row = self._group(place, own)
+        return parameters[row], states[row]
+
+    def _group(self, place: int, own: int) -> tuple[np.ndarray, np.ndarray, int]:
+        """Parameters and values of states of pieces worked out together with one, and its row among them."""
         at_once = self.series[place].at_once
         group, row = divmod(own, at_once)
         if (place, group) not in self._known:
@@ -171,8 +185,7 @@ class Pieces:
             part, first = self.series[place], group * at_once
             stop = min(first + at_once, len(part.knots) + 1)
             self._known[place, group] = part.numbers(first, stop)
-        parameters, states = self._known[place, group]
-        return parameters[row], states[row]
+        return *self._known[place, group], row
 
 
 Series = Sequence[Any]

@@ -64,7 +64,7 @@ class SetAtKnots(Requirement):
         assert system.pieces is not None
         self.pieces = system.pieces
         places = ([system.states.index(name) for name in x.states] for x in self.pieces.series)
-        self._places = [np.array(place) for place in places]
+        self._places = [_slice_if_any(place) for place in places]
         self._entered: tuple[int, int] | None = None
         self._equal = _equal_pieces(self.pieces.knots)
 
@@ -103,16 +103,17 @@ class SetAtKnots(Requirement):
         if last < number:
             return None
 
+        coming, self._entered = self.pieces.following(number), None
+        knot, parameters, changes = next(coming)
+
         def passed(engine: TaylorEngine) -> bool:
             """Go on in the next piece, if the step ended where it begins."""
-            nonlocal number
-            if engine.time != knots[number - 1]:
+            nonlocal knot, parameters, changes
+            if engine.time != knot:
                 return False
-            parameters, changes = self.pieces.begun(number)
             self._change(engine, changes)
             engine.pars[:] = parameters
-            self._entered = (number, id(engine))
-            number += 1
+            knot, parameters, changes = next(coming)
             return True
 
         return knots[last], knots[number - 1] - knots[number - 2], passed
@@ -120,6 +121,13 @@ class SetAtKnots(Requirement):
     def _end(self, number: int) -> Scalar | None:
         knots = self.pieces.knots
         return knots[number] if number < len(knots) else None
+
+
+def _slice_if_any(places: list[int]) -> Any:
+    """Places in a row as a slice, which numpy looks up several times as fast."""
+    if places and places == list(range(places[0], places[-1] + 1)):
+        return slice(places[0], places[-1] + 1)
+    return np.array(places, dtype=int)
 
 
 def _equal_pieces(knots: list[Any]) -> np.ndarray:

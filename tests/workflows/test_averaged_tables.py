@@ -80,6 +80,18 @@ def test_a_table_of_an_orbit_averages_as_the_orbit_does(level: str, full: rigids
     assert apart(found, full) < 10 * path * (nodding**2 + nodding / SPIN + NODE * nodding) + bound
 
 
+def test_columns_that_rest_are_constants() -> None:
+    """A column of equal values changes no bit of what the same constant gives."""
+    given = text("orbit_averaged", by_table=True, short_period=False, anomaly=False)
+    lines = table(anomaly=False).splitlines()
+    axes = "\n".join([lines[0] + ", semi_major_axis", *(f"{line}, 1.0" for line in lines[1:])])
+    column = given.replace(table(anomaly=False), axes).replace("semi_major_axis = 1, ", "")
+    states = prepare(rigidsim.parse(column)).system.states
+    assert not [name for name in states if "axis" in name]
+    one, other = (run_text(x).dataset.momentum_axis.values for x in (given, column))
+    assert (one == other).all()
+
+
 @pytest.mark.slow
 def test_the_obliquity_of_mars_swings_as_published() -> None:
     """On its perturbed orbit, over half a million years: Ward 1973, Science 181, 260, says some 120,000 years

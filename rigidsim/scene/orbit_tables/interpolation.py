@@ -35,6 +35,7 @@ class Interpolation:
 
     def __init__(self, lengths: np.ndarray, values: np.ndarray) -> None:
         self.lengths, self.values = lengths, values
+        self._even = bool((lengths == lengths[:1]).all())
 
     def narrowed(self) -> Interpolation:
         """The same in the platform's longest floating point, of at least double precision."""
@@ -45,14 +46,19 @@ class Interpolation:
         (t - t_i) / (t_{i+1} - t_i). Floats must not grow beyond order one.
         """
         lengths, values, count = self.lengths, self.values, min(NEAREST, len(self.values))
-        both = np.stack([numbers, numbers + 1])
-        first = np.clip(both - count // 2, 0, len(values) - count)
-        near = first[..., None] + np.arange(count)
-        ends = np.cumsum(lengths[near[..., :-1]], axis=-1)  # from the first of the rows around
-        offsets = np.concatenate([np.zeros((*both.shape, 1), lengths.dtype), ends], axis=-1)
-        here = (both - first)[..., None]
-        offsets = offsets - np.take_along_axis(offsets, here, axis=-1)
-        d, s = (np.einsum("ani,anic->anc", w, values[near]) for w in _weights(offsets, here))
+        rows, ends = np.unique(np.stack([numbers, numbers + 1]), return_inverse=True)
+        first = np.clip(rows - count // 2, 0, len(values) - count)
+        near, here = first[:, None] + np.arange(count), rows - first
+        # rows at equal distances have equal weights, but near the table's ends
+        alike, same = np.unique(here, return_index=True, return_inverse=True)[1:]
+        if not self._even:
+            alike, same = np.arange(len(rows)), np.arange(len(rows))
+        steps = np.cumsum(lengths[near[alike, :-1]], axis=1)  # from the first of the rows around
+        offsets = np.concatenate([np.zeros((len(alike), 1), lengths.dtype), steps], axis=1)
+        place = here[alike, None]
+        offsets = offsets - np.take_along_axis(offsets, place, axis=1)
+        around = values[near]
+        d, s = (np.einsum("ni,nic->nc", w[same], around)[ends] for w in _weights(offsets, place))
         length = lengths[numbers]
         y0, y1, step = values[numbers], values[numbers + 1], length[:, None]
         a, b = d[0] * step, s[0] * step * step / 2

@@ -64,6 +64,7 @@ class TabulatedOrbit:
         self._rows = self._regular(axes)
         if window is not None:
             self._average(window)
+        self._rest()
         self.moving = tuple(name for name, values in self._rows.items() if isinstance(values, np.ndarray))
         """The elements that change, among axis, k, h, q, p, longitude."""
         columns = np.array([self._rows[name] for name in self.moving]).T
@@ -183,6 +184,13 @@ class TabulatedOrbit:
             if isinstance(values, np.ndarray):
                 self._rows[name] = np.convolve(values, weights.astype(values.dtype), "valid")
         self.table = ElementTable(times[half:-half], {}, self.context)
+
+    def _rest(self) -> None:
+        """Make constants of columns that rest; of a table in which everything does, none."""
+        columns = {name: x for name, x in self._rows.items() if isinstance(x, np.ndarray)}
+        still = [name for name, x in columns.items() if (x == x[0]).all() and name != LONGITUDE]
+        if len(still) < len(columns):
+            self._rows |= {name: self.context.convert(columns[name][0]) for name in still}
 
     # --- pieces ---------------------------------------------------------------------------------------------
 
