@@ -58,7 +58,7 @@ def run_again(folder: Path) -> str:
     config = folder / "config.toml"
     command = Remedy(f"rigidsim run {config} --out ELSEWHERE", f'rigidsim.run("{config}", out=...)')
     again = command if config.is_file() else "run its config again"
-    return f"copy it again from where it is whole, or make it again: {again}"
+    return f"copy it again from an intact copy, or make it again: {again}"
 
 
 class RigidsimError(Exception):

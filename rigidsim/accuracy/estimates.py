@@ -313,8 +313,8 @@ class _Seen:
 def _over(share: float) -> str:
     if share >= 1:
         return ", over the run"
-    words = f", over the first {100 * share:.2g} % of the run; errors are taken to go on growing so, "
-    return words + "and growth that sets in elsewhere isn't seen"
+    words = f", over the first {100 * share:.2g} % of the run; their growth is extrapolated, "
+    return words + "and growth that sets in elsewhere is missed"
 
 
 def _everywhere(prepared: InitialValueProblem, error: float, how: str) -> Estimate:

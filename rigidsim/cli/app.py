@@ -88,17 +88,17 @@ def new(
         str | None,
         typer.Argument(
             metavar="SCENE",
-            help="Its name, or another that it is known by.",
+            help="Name of a ready scene, or an alias.",
             autocompletion=options.offered("scenes"),
             show_default=False,
         ),
     ] = None,
     name: Annotated[
         str | None,
-        typer.Argument(metavar="NAME", help="Of the experiment and its file NAME.toml; default SCENE."),
+        typer.Argument(metavar="NAME", help="Name of the experiment and its file NAME.toml; default SCENE."),
     ] = None,
 ) -> None:
-    """Write a ready scene to start from, with the tables it reads; alone, list those there are by subject.
+    """Write a ready scene to start from, with the tables it reads; without a name, list all by subject.
 
     An existing file is never replaced.
 
@@ -112,9 +112,9 @@ def check(
     overrides: options.SetOption = None,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Validate configs, and show what was understood of them; nothing is run.
+    """Validate configs, and show how they were understood; nothing is run.
 
-    The exit code is 2 where one of them can't be run.
+    The exit code is 2 if a config can't be run.
 
     Example: rigidsim check heavy_top_nutating
     """
@@ -135,7 +135,7 @@ def run(
         options.option(
             "--sweep",
             "KEY=SPEC",
-            "Run once for each value of a key, time.end=[1,2] or KEY=linspace(0,1,11); repeatable.",
+            "Run once for each value of a key: time.end=[1,2] or KEY=linspace(0,1,11); repeatable.",
         ),
     ] = None,
     member: options.MemberOption = None,
@@ -143,7 +143,7 @@ def run(
     as_json: options.JsonOption = False,
     verbose: options.VerboseOption = False,
 ) -> None:
-    """Integrate, write the run folder, print how the run came out and what it cost.
+    """Integrate, write the run folder, and print verdict, accuracy and cost.
 
     Example: rigidsim run intermediate_axis --set time.end=100
     """
@@ -167,13 +167,13 @@ def sweep(
     tiles: Annotated[
         str | None, options.option("--tiles", "A:B", "Only tiles A to B-1: a share, for job arrays.")
     ] = None,
-    force: Annotated[bool, options.replacing("Replace what lies there.")] = False,
+    force: Annotated[bool, options.replacing("Replace an earlier sweep of the same name.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Run all members, and write one labelled dataset; what is there already isn't computed again. With [fit]
+    """Run all members, and write one labelled dataset; members that exist aren't computed again. With [fit]
     in the config each member is a fit.
 
-    Give the command again to go on after an interruption, or with a config whose axes are longer.
+    The same command continues after an interruption, also with longer axes in the config.
 
     Example: rigidsim sweep first_flip --workers 2
     """
@@ -191,14 +191,14 @@ def resume(
     ] = None,
     workers: Annotated[
         int | None,
-        options.option("--workers", "N", "Of a sweep: processes that run members; default 1.", min=1),
+        options.option("--workers", "N", "For a sweep: processes that run members; default 1.", min=1),
     ] = None,
     as_json: options.JsonOption = False,
     verbose: options.VerboseOption = False,
 ) -> None:
-    """Go on with an interrupted, killed or guarded run; the result is bit for bit the uninterrupted one.
+    """Continue an interrupted, killed or guarded run; the result has the bits of an uninterrupted run.
 
-    On a run that is complete it says so and does nothing: a script can call it until the exit code is 0.
+    A complete run is reported and left unchanged: a script can call resume until the exit code is 0.
 
     Example: rigidsim resume runs/intermediate_axis
     """
@@ -209,14 +209,18 @@ def verify(
     run_path: options.RunPath,
     members: Annotated[
         int | None,
-        options.option("--members", "N", "Of a sweep: how many members, drawn at random; default 100."),
+        options.option("--members", "N", "For a sweep: number of members, drawn at random; default 100."),
     ] = None,
     back: Annotated[
-        bool, typer.Option("--reversed", help="Integrate to the end and back, too: how close does it return?")
+        bool,
+        typer.Option(
+            "--reversed", help="Also integrate to the end and back, and print the distance from the start."
+        ),
     ] = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Integrate the embedded config again and compare: identical, or what differs first. Exit code 1 then.
+    """Integrate the embedded config again and compare all bits. If any differ, print the first difference and
+    exit with code 1.
 
     Example: rigidsim verify runs/intermediate_axis --reversed
     """
@@ -229,16 +233,21 @@ def plan(
     out: options.OutOption = Path("runs"),
     physics: Annotated[
         str | None,
-        options.option("--physics", "ERROR", 'Find the least model within an angle, as "0.1 arcsec".'),
+        options.option(
+            "--physics", "ERROR", 'Find the smallest model within an error, such as "0.1 arcsec".'
+        ),
     ] = None,
-    write: Annotated[Path | None, options.option("--write", "FILE", "With --physics: its config.")] = None,
+    write: Annotated[
+        Path | None,
+        options.option("--write", "FILE", "With --physics: write the smallest model as a config."),
+    ] = None,
     force: Annotated[bool, options.replacing("With --physics: replace earlier runs and the file.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Explain what would be integrated and why; predict steps, time, memory and file sizes.
 
-    With --physics run the scene without each of its effects, print what each is worth, and name the least
-    model within an error. Give the command again to go on after an interruption.
+    With --physics run the scene without each of its effects, print the size of each effect, and name the
+    smallest model within an error. The same command continues after an interruption.
 
     Example: rigidsim plan heavy_top_nutating
     """
@@ -257,23 +266,23 @@ def compare(
     convention: Annotated[
         str | None,
         options.option(
-            "--convention", "KEY=VALUE,...", "What is known of it, as order=xyzw,rate_axes=space."
+            "--convention",
+            "KEY=VALUE,...",
+            "Known parts of the file's convention, such as order=xyzw,rate_axes=space.",
         ),
     ] = None,
     out: Annotated[
         Path | None,
-        options.option("--out", "FILE", "Dataset of what was found along time, such as comparison.h5."),
+        options.option("--out", "FILE", "Dataset of errors and defects along time, such as comparison.h5."),
     ] = None,
-    figure: Annotated[Path | None, options.option("--figure", "FILE", "Figure, a .png or a .svg.")] = None,
+    figure: Annotated[Path | None, options.option("--figure", "FILE", "Figure (.png or .svg).")] = None,
     timeline: Annotated[
         Path | None,
         options.option("--timeline", "FILE", "Timeline (.rrd) of both bodies, with the angle between them."),
     ] = None,
     kernels: Annotated[
         list[Path] | None,
-        options.option(
-            "--kernels", "FILE", "Clock (SCLK) and leap seconds that a CK is read with; repeatable."
-        ),
+        options.option("--kernels", "FILE", "Clock (SCLK) and leap seconds for reading a CK; repeatable."),
     ] = None,
     force: Annotated[bool, options.replacing("Replace existing files.")] = False,
     as_json: options.JsonOption = False,
@@ -289,7 +298,8 @@ def compare(
 def fit(
     config: options.ConfigPath,
     out: Annotated[
-        Path, options.option("--out", "DIR", "Folder of the fits' folders; an interrupted fit there goes on.")
+        Path,
+        options.option("--out", "DIR", "Folder of the fits' folders; an interrupted fit there is restarted."),
     ] = Path("fits"),
     overrides: options.SetOption = None,
     write: Annotated[
@@ -308,7 +318,7 @@ def fit(
 
 @_command("saved")
 def info(run_path: options.RunPath, as_json: options.JsonOption = False) -> None:
-    """Summary of a run, finished or partial; exit code 2 if its dataset is damaged or was edited.
+    """Print the summary of a run, finished or partial; exit code 2 if its dataset is damaged or was edited.
 
     Example: rigidsim info runs/intermediate_axis
     """
@@ -325,32 +335,38 @@ def view(
             autocompletion=options.offered("runs"),
         ),
     ],
-    web: Annotated[bool, typer.Option("--web", help="In the browser, served on loopback only.")] = False,
+    web: Annotated[
+        bool, typer.Option("--web", help="Show the timeline in a browser, served on loopback only.")
+    ] = False,
     png: Annotated[Path | None, options.option("--png", "FILE", "Draw a picture, without a display.")] = None,
     gif: Annotated[Path | None, options.option("--gif", "FILE", "Draw a film, without a display.")] = None,
-    mp4: Annotated[Path | None, options.option("--mp4", "FILE", "The same; needs rigidsim[film].")] = None,
+    mp4: Annotated[
+        Path | None, options.option("--mp4", "FILE", "Draw a film, without a display; needs rigidsim[film].")
+    ] = None,
     seconds: Annotated[
-        float | None, typer.Option("--seconds", min=0.5, max=120.0, help="That a film lasts; default 6.")
+        float | None, typer.Option("--seconds", min=0.5, max=120.0, help="Length of a film; default 6.")
     ] = None,
     member: Annotated[
         list[int] | None,
-        typer.Option("--member", metavar="N", min=0, help="Of a sweep: member N, from 0; repeatable."),
+        typer.Option(
+            "--member", metavar="N", min=0, help="For a sweep: member N, counted from 0; repeatable."
+        ),
     ] = None,
     at: Annotated[
         str | None,
-        options.option("--at", "TIME", 'Moment of a picture, in the scene\'s unit or as "2.4 hr".'),
+        options.option("--at", "TIME", 'Moment of a picture, in the scene\'s unit or with a unit: "2.4 hr".'),
     ] = None,
     part: Annotated[
         str | None,
         options.option(
-            "--part", "PART", "Of the page, in pictures and films: page (the default), scene or plots."
+            "--part", "PART", "Part to draw in pictures and films: page (the default), scene or plots."
         ),
     ] = None,
 ) -> None:
-    """Open timelines in the rerun viewer (drawn first, where a run has none), or draw them to a file.
+    """Open timelines in the rerun viewer, or draw them to a file. Missing timelines are written first.
 
-    A run that another process is working on is followed while it goes on. A fit is shown as its motion,
-    with a cone of one standard deviation about the figure axis.
+    A run in another process is followed while it continues. A fit is shown as its motion, with a cone of
+    one standard deviation about the figure axis.
 
     Example: rigidsim view runs/intermediate_axis
     """
@@ -364,7 +380,7 @@ def plot(
     run_path: options.SeenPath,
     what: Annotated[
         list[str] | None,
-        options.option("--what", "NAME", "Figure to draw; repeatable. all: every one the run has."),
+        options.option("--what", "NAME", "Figure to draw, or all for every figure of the run; repeatable."),
     ] = None,
     out: Annotated[
         Path | None,
@@ -377,11 +393,11 @@ def plot(
     for_slides: Annotated[
         str | None,
         options.option(
-            "--for-slides", "GROUND", "One panel in large letters on a light or dark ground: light or dark."
+            "--for-slides", "GROUND", "One panel in large letters, on a ground that is light or dark."
         ),
     ] = None,
 ) -> None:
-    """Draw the page that suits the scene, or the figures named; of a sweep a variable over its axes.
+    """Draw the page that suits the scene, or named figures; for a sweep, a variable over its axes.
 
     Example: rigidsim plot runs/intermediate_axis --what polhode --out flip.svg
     """
@@ -392,24 +408,23 @@ def tradeoff(
     config: options.ConfigPath,
     overrides: options.SetOption = None,
     out: options.OutOption = Path("runs"),
-    budget: Annotated[float, options.option("--budget", "SECONDS", "Time that it may take, roughly.")] = 90.0,
+    budget: Annotated[float, options.option("--budget", "SECONDS", "Time limit, roughly.")] = 90.0,
     repeats: Annotated[
-        int, options.option("--repeats", "N", "Fresh processes in which speeds are taken.")
+        int, options.option("--repeats", "N", "Fresh processes in which speed is measured.")
     ] = 3,
     full: Annotated[
-        bool, typer.Option("--full", help="Every tolerance in every formulation; needs a larger budget.")
+        bool,
+        typer.Option("--full", help="Measure every tolerance in every formulation; needs a larger budget."),
     ] = False,
     files: Annotated[
         list[str] | None,
-        options.option(
-            "--with", "FILE,SECONDS", "Another tool's trajectory, and the CPU time it took; repeatable."
-        ),
+        options.option("--with", "FILE,SECONDS", "Another tool's trajectory and its CPU time; repeatable."),
     ] = None,
     force: Annotated[bool, options.replacing("Replace an earlier measurement.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Measure speed against accuracy of a scene: what to use for which accuracy. Dataset and figure in
-    NAME_tradeoff.
+    """Measure the speed and accuracy of settings for a scene, and recommend settings by accuracy. Dataset and
+    figure are written to NAME_tradeoff.
 
     Example: rigidsim tradeoff asymmetric_top
     """
@@ -424,13 +439,13 @@ def export(
     out: Annotated[
         Path | None, options.option("--out", "PATH", "Default NAME.FORMAT in this folder.")
     ] = None,
-    force: Annotated[bool, options.replacing("Replace what is there.")] = False,
+    force: Annotated[bool, options.replacing("Replace existing files.")] = False,
     angle_unit: Annotated[
         str | None,
         options.option(
             "--angle-unit",
             "UNIT",
-            "For csv, parquet and zarr: rad, turns, deg, arcsec or mas; columns are named by it.",
+            "For csv, parquet and zarr: rad, turns, deg, arcsec or mas; names of columns contain it.",
         ),
     ] = None,
     epoch: Annotated[
@@ -438,7 +453,7 @@ def export(
         options.option(
             "--epoch",
             "TIME",
-            "What time 0 is, where the config doesn't say, for aem, oem, ck, pck and the dates of csv: "
+            "Date of time 0 if the config has none, for aem, oem, ck, pck and the dates of csv: "
             '"2029-04-13T21:46:00 TDB".',
         ),
     ] = None,
@@ -447,25 +462,30 @@ def export(
         options.option(
             "--axes",
             "NAME",
-            "For aem, oem, ck, pck: the space axes, where the config doesn't say: ICRF, EME2000, ...",
+            "Space axes if the config names none, for aem, oem, ck and pck: ICRF, EME2000, ...",
             "--frame",
         ),
     ] = None,
     object_name: Annotated[
         str | None,
-        options.option("--object-name", "NAME", "For aem and oem; the frame's name for ck and pck."),
+        options.option(
+            "--object-name", "NAME", "Name of the object in aem and oem; name of the frame for ck and pck."
+        ),
     ] = None,
     object_id: Annotated[
         str | None,
-        options.option("--object-id", "ID", "For aem and oem; for ck and pck NAIF's, 301 or moon."),
+        options.option(
+            "--object-id", "ID", "ID of the object in aem and oem; for ck and pck NAIF's: 301 or moon."
+        ),
     ] = None,
     variable: Annotated[
-        list[str] | None, options.option("--variable", "NAME", "Only this variable, along time; repeatable.")
+        list[str] | None,
+        options.option("--variable", "NAME", "Variable to export, along time; repeatable. Default: all."),
     ] = None,
 ) -> None:
     """Write a run for other tools: tables with every digit, CCSDS messages, or kernels of SPICE.
 
-    Of a sweep csv and parquet hold a row per member, and zarr its dataset.
+    For a sweep, csv and parquet hold a row per member, and zarr the dataset.
 
     Example: rigidsim export runs/intermediate_axis --format csv
     """
@@ -483,17 +503,19 @@ def analyse(
             "the main signals of the scene.",
         ),
     ] = None,
-    lines: Annotated[int, typer.Option("--lines", metavar="N", help="Of each signal at most.")] = 20,
+    lines: Annotated[
+        int, typer.Option("--lines", metavar="N", help="Largest number of lines of each signal.")
+    ] = 20,
     out: Annotated[
         Path | None,
         options.option(
-            "--out", "FILE", "Dataset; default analysis.h5 in the run. The figure goes next to it."
+            "--out", "FILE", "Dataset, with the figure next to it; default analysis.h5 in the run folder."
         ),
     ] = None,
     force: Annotated[bool, options.replacing("Replace an existing analysis.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Secular rates and spectral lines, labelled with the scene's frequencies: table, dataset and figure.
+    """Find secular rates and spectral lines, labelled with the scene's frequencies: table, dataset, figure.
 
     Example: rigidsim analyse runs/earth_free_nutation --lines 5
     """

@@ -63,5 +63,5 @@ VerboseOption = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 MemberOption = Annotated[
-    int | None, option("--member", "N", "Of a sweep: member N by itself, counted from 0.", min=0)
+    int | None, option("--member", "N", "For a sweep: run member N alone, counted from 0.", min=0)
 ]

@@ -186,7 +186,7 @@ def _of_xml(text: str, kind: str, path: Path) -> Iterator[_Segment]:
     try:
         every = list(ElementTree.fromstring(text).iter())
     except ElementTree.ParseError as error:
-        raise RigidsimError(f"{path}: is no XML ({error}); write it anew") from None
+        raise RigidsimError(f"{path}: is no XML ({error}); write it again") from None
     for message in every:
         if _tag(message) != kind.lower():
             continue

@@ -245,11 +245,11 @@ class SpiceRun:
             *self.named.notes,
             "SPICE takes EME2000, ICRF and GCRF for the same, J2000",
             f"time 0 of the run: {self.named.epoch}, TDB {float(self.ahead)!r} s from J2000 in SPICE's count",
-            f"body: {self.body}" if self.body else "body: not named (--object-id); 0 stands for it",
+            f"body: {self.body}" if self.body else "body: not named (--object-id); its ID is 0",
             *what,
             *announced,
-            f"interpolation: read back by SPICE at {count} times between its rows, it is at most {away:.1e} "
-            f"rad from the run, its angular velocity {slow:.1e} of the largest",
+            f"interpolation: read by SPICE at {count} times between its rows, attitudes differ from the run "
+            f"by at most {away:.1e} rad, angular velocities by {slow:.1e} of the largest",
             f"numbers: the run's {self.source.bits} bits rounded to doubles; SPICE's times are doubles, here "
             f"{spacing:.2g} s apart, in which the body turns by {self.fastest * spacing:.1e} rad",
         ]

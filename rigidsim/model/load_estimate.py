@@ -376,7 +376,7 @@ def _oddness(load: Load, quaternion: np.ndarray, here: float, there: float) -> P
         next(odd, "loads"),
         f"{load.title} depends on the sign of the quaternion: at q = [{shown}] a part of it is "
         f"{here:.3g} (in internal units), at -q, which is the same attitude, {there:.3g}; use products such "
-        "as qw*qx, or say where it jumps: sign(qw)*qx",
+        "as qw*qx, or write the jump: sign(qw)*qx",
     )
 
 

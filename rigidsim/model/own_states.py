@@ -107,7 +107,7 @@ def refuse_odd_states(scene: Scene) -> None:
                 Problem(
                     state.derivative.where,
                     "changes with the sign of the quaternion, while q and -q are the same attitude; use "
-                    "products such as qw*qx, or say where it jumps: sign(qw)*qx",
+                    "products such as qw*qx, or write the jump: sign(qw)*qx",
                 )
             ),
         )

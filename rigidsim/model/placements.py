@@ -708,7 +708,7 @@ class PlacedByKernel(Placement):
         """The body that the key ``source`` of a load names."""
         ephemeris = kernel_body(source, around)
         if not around.host:
-            what = "nothing says from which body of the kernel it is seen; name that in "
+            what = "the config doesn't name the body from which it is seen; name this body in "
             what += '[body] host, such as "moon"'
             if around.bodies is not None and around.bodies.host is not None:
                 own = around.bodies.names[around.bodies.host]

@@ -570,7 +570,7 @@ _FOLLOWS = {
     "angular_momentum_norm": ("angular_momentum", "its three components are projected"),
     "energy": ("rotational_energy", "its rotational part is projected; nothing turns the flight's velocity"),
 }
-_ALONE = "it is watched alone: what is projected is a set that keeps the numbers of earlier runs"
+_ALONE = "it is only monitored: projecting it would change the numbers of earlier runs"
 _NEVER = {
     "energy_balance": "it checks a work that is integrated with the motion and doesn't act on it",
     **{observable.name: _ALONE for observable in WATCHED},

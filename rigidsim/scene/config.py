@@ -267,7 +267,7 @@ def load(path: str | Path, *, overrides: Overrides = ()) -> Experiment:
     Raises:
         ConfigError: no path is given, or the file is missing, not text, too large, or a bad config.
     """
-    what = f"given {messages.shown(path)}; the path of a config is allowed (tables go to run as they are, or "
+    what = f"given {messages.shown(path)}; the path of a config is allowed (pass tables to run directly, or "
     ensure(isinstance(path, str | Path), ConfigError(Problem("path", what + "to Experiment.from_dict)")))
     path = Path(path)
 

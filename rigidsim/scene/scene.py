@@ -313,7 +313,9 @@ def _fail(table: str, key: str, text: str) -> ConfigError:
 def _translation(config: Config, body: RigidBody, context: Any) -> tuple[Vector | None, Vector | None]:
     if not config.initial.flies:
         if config.initial.frame is not None:
-            raise _fail("initial", "frame", "given without position or velocity, which it is of; add them")
+            raise _fail(
+                "initial", "frame", "given without position or velocity, whose axes it names; add one"
+            )
         return None, None
     if any(x != 0 for x in body.center_of_mass):
         raise _fail(
@@ -555,8 +557,8 @@ def _check_branch(scene: Scene) -> list[Problem]:
         return []
     what = (
         f"given {scene.context.nstr(middle, 8)} rad for the middle angle, while {', '.join(sorted(read))} "
-        f"stands in an expression; there {shown} is allowed for {sequence}: give the same attitude so, or "
-        "as a quaternion"
+        f"is in an expression; {shown} is allowed for {sequence}: give the same attitude with such an "
+        "angle, or as a quaternion"
     )
     return [Problem("[initial] euler_angles", what)]
 
@@ -619,7 +621,7 @@ def _check_span(expression: Expression, scene: Scene) -> list[Problem]:
         for _ in range(context.prec):
             middle = (last + beyond) / 2
             last, beyond = (middle, beyond) if _refusal(part, middle, context) is None else (last, middle)
-        what = f"no finite value after t = {context.nstr(last, 8)} s, while the run goes on to "
+        what = f"no finite value after t = {context.nstr(last, 8)} s, but the run ends at "
         what += f"{context.nstr(scene.end, 8)} s; rewrite it, or end the run before: {tried[1]}"
         problems.append(Problem(expression.where, what))
     return problems

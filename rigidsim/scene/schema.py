@@ -179,7 +179,7 @@ class Model(ConfigTable):
     def _of_averages(self) -> Self:
         given = [key for key in ("order", "start", "geodetic_precession") if key in self.model_fields_set]
         if given and self.level == "full":
-            raise refuse(f'{given[0]} is given with level = "full"; it is of averaged levels: leave it out')
+            raise refuse(f'{given[0]} is given with level = "full", but is for averaged levels: leave it out')
         return self
 
     @property

@@ -209,8 +209,8 @@ NAMED_OTHERWISE = {
     "currents in the body are eddy_currents (docs/loads/eddy_currents.md)": (
         "eddy", "eddy_current", "eddy_current_damping", "eddy_torque", "foucault_current",
     ),
-    "a law of control is a torque or a force of expressions (docs/loads/torque.md), with [[states]] for what "
-    "it remembers (docs/own_states.md)": (
+    "a control law is a torque or a force of expressions (docs/loads/torque.md), with [[states]] for its "
+    "memory (docs/own_states.md)": (
         "controller", "control", "control_torque", "pd", "pid", "pd_control", "pid_control",
         "attitude_control", "actuator", "motor", "spring", "spring_torque",
     ),

@@ -345,7 +345,7 @@ def _of_fits(table: SweepTable) -> list[Problem]:
     keys = [key for key in table.axes if re.fullmatch(r"\s*fit\s*(\.\s*parameters\b.*)?", key)]
     problems = [Problem(f'[sweep] axes."{key[:60]}"', what) for key in keys]
     if "keep" in table.model_fields_set:
-        what = "given with [fit]: each member is a fit, and what it finds is kept; leave keep out"
+        what = "given with [fit]: each member is a fit, whose results are always kept; leave keep out"
         problems.insert(0, Problem("[sweep] keep", what))
     return problems
 

@@ -91,7 +91,7 @@ def _remedy(text: str, why: str) -> str:
     match = _ASSIGNMENT.fullmatch(line) if len(line) <= _LONGEST_SHOWN else None
     if match is None:
         return f": {line}" if 0 < len(line) <= _LONGEST_SHOWN else ""
-    return f'; texts, and numbers with units, stand in quotes: "{match["value"]}"'
+    return f'; texts, and numbers with units, need quotes: "{match["value"]}"'
 
 
 def _dotted(key: re.Match[str]) -> str:

@@ -107,7 +107,7 @@ class Diagnostics:
         if corrected is not None:
             acting = [one.registered for one in corrected.effects if one.registered and not one.rewrites]
             if acting:  # which a closed form knows nothing of
-                trail, beside = None, f"; they are without the effects {', '.join(acting)}"
+                trail, beside = None, f"; the closed form lacks the effects {', '.join(acting)}"
         last = float(self.prepared.scene.samples.last)
         found = estimate_errors(
             self.prepared,
@@ -148,8 +148,8 @@ class Diagnostics:
             if math.isinf(drift):
                 yield Caution(
                     WarningCode.DRIFT,
-                    f"{name} has no finite value at some samples, so that its drift isn't known; see where "
-                    "it is NaN in the dataset, and mend its expression or leave it out",
+                    f"{name} has no finite value at some samples, so its drift isn't known; find the NaN in "
+                    "the dataset, and correct the expression or leave it out",
                 )
             elif not drift <= self.drift_bound:
                 yield Caution(
@@ -255,8 +255,8 @@ class Diagnostics:
             names = [r.name for r in system.recorded if r.continuity == "unwrap"]
             yield Caution(
                 WarningCode.NOT_JOINED,
-                f"the turns of {' and '.join(names)} aren't known from {self._words.moment(lost, 6)} on, "
-                'where they are recorded within one turn; sample more often, or choose method = "taylor"',
+                f"the turns of {' and '.join(names)} aren't known from {self._words.moment(lost, 6)} on; "
+                'later angles are within one turn; sample more often, or choose method = "taylor"',
             )
         if joined and turns > 1:
             yield Caution(

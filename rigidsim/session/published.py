@@ -63,7 +63,7 @@ class PublishedAttitude:
         try:
             equatorial = orientation.matrices(dates)
         except KernelError as error:
-            raise RunFolderError(f"{orientation.place}: {error}; resume the run once it is back") from None
+            raise RunFolderError(f"{orientation.place}: {error}; restore it, then resume the run") from None
         named = self.figure.first, self.figure.second, self.figure.pole
         axes = np.array([[float(x) for x in axis] for axis in named])  # a row each, in body axes
         matrices = orientation.equator @ equatorial

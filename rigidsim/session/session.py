@@ -511,8 +511,8 @@ class Storage:
         return (
             f"takes about {needed} of space until it is complete ({segments} of "
             f"segments, {dataset} of dataset.h5), and {free} are free there; take "
-            "fewer [time] samples, record less ([output] record), choose a folder on another disk, or, where "
-            'a part of it will do, say in [limits] when it may stop, such as wall_time = "1 h"'
+            "fewer [time] samples, record less ([output] record), choose a folder on another disk, or "
+            'limit the run by [limits], such as wall_time = "1 h"'
         )
 
 

@@ -291,7 +291,7 @@ class Parametrised:
             if same and looked.form == made.form:
                 return
         names = ", ".join(key.name for key in self.keys)
-        what = f"names {names}, of which one changes the form of the equations; leave it out"
+        what = f"names {names}; one of these changes the form of the equations: leave it out"
         raise ConfigError(Problem(WHERE, what), self._experiment.source)
 
 

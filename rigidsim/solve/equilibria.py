@@ -438,7 +438,7 @@ def _refuse_passing(scene: Scene, precision: Any, orbit: KeplerOrbit, found: Pos
         raise NoEquilibrium(f"{what}: nothing rests there")
     for name, slope in here.acceleration(found)[1].items():
         if abs(slope) > least:
-            raise NoEquilibrium(f"the state {name} changes in it; start it where it rests")
+            raise NoEquilibrium(f"the state {name} changes in this equilibrium; start the state at rest")
 
 
 def _linear(context: Any, motion: PoseMotion, at: Pose, bits: int) -> Matrix:
@@ -501,7 +501,7 @@ def cassini_state(scene: Scene, number: int) -> InitialRotation:
     angles = [context.atan2(norm(context, cross(pole, v)), dot(pole, v)) for v in (normal, [0, 0, 1])]
     degrees = [str(context.nstr(context.degrees(angle), 6)) for angle in (*angles, abs(tilt))]
     if abs(abs(tilt) - angles[0]) > _NEAR:
-        what = f"the motion that comes back near it is {degrees[0]} deg from the orbit's normal, and the "
+        what = f"the motion that returns to itself is {degrees[0]} deg from the orbit's normal, and the "
         raise NoEquilibrium(f"{what}averaged state {degrees[2]} deg: the torque is too strong for averages")
     step = "turning at the given rate"
     if turns is not None:

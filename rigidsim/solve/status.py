@@ -49,6 +49,6 @@ _MESSAGES = {
     Status.NON_FINITE: "the state stopped being finite; the samples before it are kept",
     Status.COLLAPSED: "the steps became too small to ever arrive; the samples so far are kept",
     Status.UNRESOLVED: "the motion can't be continued past a switching surface; the samples so far are kept",
-    Status.IMPOSSIBLE: "no body can go on like this; the samples so far are kept",
+    Status.IMPOSSIBLE: "the values became impossible for a body; the samples so far are kept",
     Status.OUT_OF_RANGE: "the motion left the range in which a model is known; the samples so far are kept",
 }

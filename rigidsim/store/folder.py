@@ -342,7 +342,7 @@ class SweepFolder(WorkFolder):
         except FileNotFoundError:
             if not any(self.tiles.glob("g*.json")) or self.dataset.exists():
                 return None
-            why = "was begun by a version of rigidsim that this one can't go on with"
+            why = "was begun by an incompatible version of rigidsim"
         except (OSError, ValueError) as error:
             why = f"is damaged ({str(error).splitlines()[0]})"
         raise RunFolderError(f"{self.note}: {why}; {FORCE} runs all members again")

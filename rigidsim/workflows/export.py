@@ -62,8 +62,8 @@ def export(
     for option, given in (("--variable", ", ".join(variables)), ("--angle-unit", angle_unit)):
         if given and not found.angles:
             raise RigidsimError(
-                f"{option}: given {given}, but {file_format} prescribes what it holds; csv, parquet and zarr "
-                "don't"
+                f"{option}: given {given}, but {file_format} has prescribed contents; choose csv, parquet "
+                "or zarr"
             )
     name = saved.folder.path.resolve().name
     target = Path(f"{name}{found.suffix or f'.{file_format}'}") if out is None else Path(out)

@@ -477,7 +477,7 @@ class _Models:
         begun = folder.config.exists() and (folder.dataset.exists() or folder.segments.exists())
         if begun and folder.config.read_text(encoding="utf-8") == model.text:
             if not folder.dataset.exists():
-                self._report(f"{model.config.name}: goes on")
+                self._report(f"{model.config.name}: continues")
             return resume(folder.path, tuning=self._tuning, progress=False)
         if begun and not self._force:
             raise RunFolderError(

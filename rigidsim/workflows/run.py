@@ -376,7 +376,7 @@ def resume(
         if folder.config.read_text(encoding="utf-8") != experiment.text:
             atomic.write_bytes(folder.config, experiment.text.encode())
         if not chain.paths:
-            text = "nothing had been saved, so the run began anew"
+            text = "nothing had been saved, so the run started again"
             session.remarks.append(Caution(WarningCode.BEGUN_ANEW, text))
         run = execute(session, prepared, folder, chain if chain.paths else None)
         assert isinstance(run, SavedRun)

@@ -271,8 +271,8 @@ def _summary_problems(folder: RunFolder, again: Brief) -> list[str]:
             problems.append(f"{folder.timeline}: is missing; rigidsim view draws it again")
         elif provenance.file_sha256(folder.timeline) != saved.timeline_sha256:
             problems.append(
-                f"{folder.timeline}: was damaged or changed since it was drawn; rigidsim view draws it again "
-                "once it is removed"
+                f"{folder.timeline}: was damaged or changed since it was drawn; remove it, and rigidsim view "
+                "draws it again"
             )
     return problems
 

@@ -130,7 +130,7 @@ def test_its_errors_are_announced_and_true(tmp_path: Path) -> None:
     true = angle_between(data["quaternion"].values, exact).max()
     assert true <= accuracy["estimated_attitude_error"] <= 100 * true
     assert "a solution in quaternions" in accuracy["estimated_how"]
-    assert "without the effects" not in accuracy["estimated_how"]
+    assert "lacks the effects" not in accuracy["estimated_how"]
     w = data["quaternion"].values[:, 0]
     assert (np.diff(np.sign(w)) != 0).sum() >= 5  # half turns, where the set is changed
     assert {"energy", "angular_momentum_vertical"} <= set(run.summary["invariants"])

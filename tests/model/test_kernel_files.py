@@ -50,7 +50,7 @@ def flipped(at: int, bit: int = 0x40) -> Callable[[bytes], bytes]:
 
 
 DAMAGE: dict[str, tuple[Callable[[bytes], bytes], str]] = {
-    "cut": (lambda x: x[:20_000], "which is truncated: it has 20000 bytes, and its segments go on to 54912"),
+    "cut": (lambda x: x[:20_000], "which is truncated: it has 20000 bytes, and its segments extend to 54912"),
     "empty": (lambda _: b"", "which is no SPK file, or a damaged one (file starts with b''"),
     "of attitudes": (lambda x: b"DAF/CK  " + x[8:], "it begins with DAF/CK); a file .bsp of SPICE"),
     "list without an end": (lambda x: x[:1024] + np.float64(2).tobytes() + x[1032:], "has no end"),

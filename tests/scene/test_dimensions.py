@@ -83,11 +83,11 @@ def test_what_fits_is_taken(text: str, unit: str | None) -> None:
         ("sin(t - 5 s)", None, '"sin" takes a number or an angle, given a value in "s"; divide by "(1 s)"'),
         ("tau*wz", "N m", 'the expression is a value in "W", where "N m" is needed'),
         ("90 deg", "N m", 'the expression is a number or an angle, where "N m" is needed'),
-        ("1/2 s", None, 'column 2: a number with a unit stands in parentheses next to "/" and "^"'),
+        ("1/2 s", None, 'column 2: a number with a unit needs parentheses next to "/" and "^"'),
         ("2 t", None, '("t" is no unit here, but a name of this scene)'),
         ("2 m", None, '("m" is no unit here, but a name of this scene)'),
         ("5 s*T", None, '"T" is a name of this scene, and a unit as well; write the unit without "*"'),
-        ("90*deg", None, 'unknown name "deg"; a unit stands behind a number, as in 2 deg'),
+        ("90*deg", None, 'unknown name "deg"; a unit follows a number, as in 2 deg'),
     ],
 )
 def test_what_does_not_fit_is_refused(text: str, unit: str | None, message: str) -> None:

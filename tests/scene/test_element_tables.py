@@ -53,7 +53,7 @@ BAD = {
     "few": ("time, periapsis\n0, 3\n1, 3", "has 2 rows; 8 or more are needed"),
     "back": (
         "time, periapsis\n" + "\n".join(f"{i % 7}, 1" for i in range(9)),
-        "line 9: its time doesn't go on",
+        "line 9: its time doesn't continue the order",
     ),
 }
 

@@ -143,8 +143,8 @@ REFUSED = {
     'format = "snvec"': "hnbody",
     'frame = "galactic"': "",
     'frame = "ICRF"': "the space axes have no name; give [frame] axes",
-    'semi_major_axis = "1 au", window = "100 yr"': "of which a window takes 1; 3 to",
-    'semi_major_axis = "1 au", window = "100 kyr"': "of which a window takes",
+    'semi_major_axis = "1 au", window = "100 yr"': "the window takes 1; 3 to",
+    'semi_major_axis = "1 au", window = "100 kyr"': "the window takes",
 }
 
 

@@ -238,7 +238,7 @@ def test_nothing_saved_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         with pytest.raises(Cut):
             rigidsim.run(rigidsim.parse(text), out=tmp_path / "cut")
     done = rigidsim.resume(tmp_path / "cut" / "cut")
-    assert "nothing had been saved, so the run began anew" in done.summary["warnings"]
+    assert "nothing had been saved, so the run started again" in done.summary["warnings"]
     same_bits(whole, done)
 
 

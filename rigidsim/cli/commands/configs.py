@@ -177,8 +177,7 @@ def print_plan(plan: RunPlan) -> None:
         if seen:
             on.line(
                 "",
-                f"if errors go on growing as in the first {span_text(seen)}; what sets in later isn't seen "
-                "here, but by the run",
+                f"if errors keep growing as in the first {span_text(seen)}; the run reports later growth",
             )
 
 

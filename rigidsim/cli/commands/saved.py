@@ -23,7 +23,7 @@ def resume(
     """Go on with it."""
     of_runs, folder = {"until": until, "set": overrides, "verbose": verbose}, folder_at(run_path)
     if isinstance(folder, FitFolder):
-        refuse_options(f"is for runs and sweeps; {run_path} is a fit, which goes on as it was begun",
+        refuse_options(f"is for runs and sweeps; {run_path} is a fit, which resumes with its options",
                        **of_runs, workers=workers)  # fmt: skip
         from rigidsim.cli.commands import fit  # which few need
 

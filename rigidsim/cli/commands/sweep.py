@@ -78,7 +78,7 @@ class SweepProgress(SweepObserver):
 
     def checking(self, sweep: Sweep) -> None:
         self._meter.name = sweep.experiment.config.name
-        self._meter.phase(f"{sweep.count:,} members: trying out what they are made of")
+        self._meter.phase(f"{sweep.count:,} members: checking their configs")
 
     def started(self, folder: Path, members: int, done: int) -> None:
         self._members, self._before, self._begin = members, done, time.perf_counter()

@@ -682,7 +682,7 @@ def _followed(
             if part < _NEAR and torques.parameter_at(now + step * first) > PARAMETER:
                 failure = _SEPARATRIX
             elif part < _NEAR:
-                failure = "a torque has no finite value somewhere on the rotation that it is averaged over"
+                failure = "a torque has no finite value somewhere in the averaged rotation"
             continue
         time = end if step >= end - time else time + step
         now = later

@@ -618,9 +618,9 @@ class ResonantMechanics(AveragedMechanics):
 _OF_FIGURE = ("figure_axis",)
 _WHY = {
     "spin_averaged": "the direction of the angular momentum, under torques averaged over the body's free "
-    "rotation: its size and the energy stay as they are",
+    "rotation; the norm and the energy are constant",
     "orbit_averaged": "the direction of the angular momentum, under torques averaged over the body's free "
-    "rotation and over the sources' orbits: its size and the energy stay as they are",
+    "rotation and over the sources' orbits; the norm and the energy are constant",
 }
 
 _WHY_TURNED = "the direction of the angular momentum, under gravity gradients averaged over the free rotation"

@@ -559,9 +559,9 @@ class Elasticity(Load, Carrier):
         yield EffectPart("delay", "delay of the distortion", {"delay": 0}, missing=missing)
         raising = _raising(fields, table.raised_by)
         both = bool(raising) and table.spin
-        missing = "" if both else "no source raises any" if table.spin else "they are all that distorts"
+        missing = "" if both else "no source raises any" if table.spin else "tides alone distort the body"
         yield EffectPart("tides", _of_sources(fields, raising), {"raised_by": []}, missing=missing)
-        missing = "" if both else "it is all that distorts" if table.spin else "spin is false"
+        missing = "" if both else "the spin alone distorts the body" if table.spin else "spin is false"
         yield EffectPart("spin", "distortion by the spin", {"spin": False}, missing=missing)
 
     @staticmethod
@@ -709,7 +709,7 @@ class Elasticity(Load, Carrier):
             raise fault(
                 "delay",
                 f"given {span_text(float(plain(self.delay)), 4)}, in which body and source turn by "
-                f"{angle:.3g} rad; up to {_TOO_LATE:g} is allowed, since what it does is a series in it",
+                f"{angle:.3g} rad; up to {_TOO_LATE:g} is allowed, for a series in the delay",
             )
         least, count = working_epsilon(scene.context) / 4, 0
         left = distorted * factor
@@ -729,8 +729,8 @@ class Elasticity(Load, Carrier):
             late = span_text(float(plain(self.delay)), 4)
             yield Caution(
                 WarningCode.DELAY_TOO_LONG,
-                f"{WHERE} delay: in {late} body and source turn by {turned:.2g} rad, of which the expansion "
-                f"to second order leaves out some {turned**2 / 6:.1%} of what the delay does",
+                f"{WHERE} delay: in {late} body and source turn by {turned:.2g} rad; the expansion to "
+                f"second order neglects some {turned**2 / 6:.1%} of the delay's effect",
             )
 
     # --- at the start, in numbers ---------------------------------------------------------------------------

@@ -99,7 +99,7 @@ class Rotor(Load):
             not fields.fixed or fields.torque is None,
             around.fault(
                 "torque",
-                "given with fixed = true, which keeps the rate by whatever torque that takes; remove one",
+                "given with fixed = true, which keeps the rate with any torque needed; remove one",
             ),
         )
         own = dot(axis, apply(body.inertia, axis)) / dot(axis, axis)

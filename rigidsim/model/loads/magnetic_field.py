@@ -135,11 +135,11 @@ def _refuse_elsewhere(fields: MagneticFieldFields, around: Setting) -> None:
         raise around.fault(fields.elements.key, f"given for a body that {why}")
     ensure(
         fields.field_degree is None or fields.field == IGRF,
-        around.fault("field_degree", f'given without field = "{IGRF}", whose degree it is; remove it'),
+        around.fault("field_degree", f'given without field = "{IGRF}", which alone has a degree; remove it'),
     )
     ensure(
         fields.elements is not None or fields.gravitational_parameter is None,
-        around.fault("gravitational_parameter", "given without an orbit, whose period it is for; remove it"),
+        around.fault("gravitational_parameter", "given without an orbit, whose period needs it; remove it"),
     )
     if fields.of_place and fields.elements is None and not around.free_flight:
         key = "field" if fields.field == IGRF else "source_moment"

@@ -621,7 +621,7 @@ class RadiationPressure(SurfaceLoad):
 
     @staticmethod
     def effect_parts(fields: RadiationPressureFields) -> Iterator[EffectPart]:
-        missing = "" if fields.shadow else "it is left out by shadow = false"
+        missing = "" if fields.shadow else "shadow = false leaves it out"
         yield EffectPart("shadow", "shadow on that light", {"shadow": False}, missing=missing)
 
     @classmethod
@@ -633,7 +633,7 @@ class RadiationPressure(SurfaceLoad):
             what = (
                 f'given "{name}", which is no source; {have}. A load such as a gravity_gradient on an orbit '
             )
-            raise around.fault("light", f'{what}with name = "{name}" says where it is')
+            raise around.fault("light", f'{what}with name = "{name}" gives its place')
         pushes = Pushes(around, cls.title, [f"u{axis}_{name}" for axis in "xyz"])
         pressure = fields.irradiance.at(around.context) / SPEED_OF_LIGHT
         for number, surface in pushes.surfaces():

@@ -511,7 +511,7 @@ def _finish(
     if table.preset is not None:  # with its reference, and what else stands in its place
         named = f"preset {table.preset} ({PRESETS[str(table.preset)].source})"
         scaled = f"{named}, with the mass of the config" if table.mass is not None else named
-        described = scaled if source == "preset" else f"{source} beside {named}"
+        described = scaled if source == "preset" else f"{source} with {named}"
     return RigidBody(mass, center, inertia, moments, axes, described, drawing)
 
 

@@ -66,7 +66,7 @@ _COMPARISON = (
     "step(t - 10), pulse(t, 10, 12), sign, min and max switch"
 )
 _HINTS = {
-    "=": "an expression is one value, without assignments; write only what stands right of the =",
+    "=": "an expression is one value, without assignments; write only the right-hand side of the =",
     ".": "a point is part of a number only; names have no attributes",
     "_": "names begin with a letter",
     "°": "write deg, as in 90 deg",
@@ -76,7 +76,7 @@ _NUMBER = r"(?:[0-9]+(?:_[0-9]+)*\.?(?:[0-9]+(?:_[0-9]+)*)?|\.[0-9]+)(?:[eE][+-]
 _TOKEN = re.compile(
     rf"(?P<number>{_NUMBER})|(?P<name>[A-Za-z][A-Za-z0-9_]*)|(?P<sign>\*\*|[-+*/^(),])|(?P<end>\Z)"
 )
-_PARENTHESES = 'a number with a unit stands in parentheses next to "/" and "^"'
+_PARENTHESES = 'a number with a unit needs parentheses next to "/" and "^"'
 _CHECKING = context_for("quadruple")
 
 
@@ -194,7 +194,7 @@ class _Parser:
         if self.kind == "number" and run and run.end() > match.end():
             unit, hint = run[0][match.end() :], "; a product has its *, as in 2*t"
             if unit not in self.known and units.is_unit(unit):
-                hint = f'; a unit stands apart, as in "{match[0]} {unit}"'
+                hint = f'; a space separates a unit, as in "{match[0]} {unit}"'
             self.fail(f'"{run[0]}" is no number, such as 2, 0.5 or 1e-3{hint}')
         return passed
 
@@ -240,7 +240,7 @@ class _Parser:
         if name in self.known:
             return f' ("{name}" is no unit here, but a name of this scene)' if units.is_unit(name) else ""
         if units.is_unit(name):
-            return f"; a unit stands behind a number, as in 2 {name}"
+            return f"; a unit follows a number, as in 2 {name}"
         return f'; no unit is called "{name}"'
 
     def binary(self, weakest: int) -> Expression:
@@ -326,7 +326,7 @@ class _Parser:
         arguments = self.arguments(_FUNCTIONS[name], f'"{name}" takes {_FUNCTIONS[name]}; {usage}')
         return self.node(name, start, *arguments)
 
-    def arguments(self, count: int = 1, usage: str = "one value stands in parentheses") -> list[Expression]:
+    def arguments(self, count: int = 1, usage: str = "it takes one value in parentheses") -> list[Expression]:
         """Parse the arguments in parentheses."""
         opened = self.start
         self.advance()

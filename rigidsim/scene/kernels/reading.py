@@ -217,7 +217,7 @@ class SpkKernel(Kernel):
         if not summaries:
             raise KernelError("which has no segments; an SPK file with positions of bodies is allowed")
         if (last := max(values[-1] for values in summaries)) > size:
-            what = f"which is truncated: it has {path.stat().st_size} bytes, and its segments go on to "
+            what = f"which is truncated: it has {path.stat().st_size} bytes, and its segments extend to "
             raise KernelError(f"{what}{8 * last}; copy it again")
         self._segments: dict[int, list[Any]] = {}
         for values in summaries:
@@ -281,7 +281,7 @@ class SpkKernel(Kernel):
         start, end, _, _, frame, kind, first, last = summary
         if kind not in _TYPES:
             what = f'whose "{label}" is of SPK type {kind}; types 2 and 3 (Chebyshev) are allowed: '
-            raise KernelError(what + "write it anew as one of them, as SPICE's spkmerge or JPL's Horizons do")
+            raise KernelError(what + "convert it to one of these, as SPICE's spkmerge or JPL's Horizons do")
         if frame != _FRAME:
             raise KernelError(f'whose "{label}" is in frame {frame} of SPICE; J2000 (1) is allowed')
         try:

@@ -60,7 +60,7 @@ def loaded(*paths: Path) -> Iterator[Any]:
     toolkit = spice()
     long = next((path for path in paths if len(str(path)) > _LONGEST_PATH), None)
     if long is not None:
-        raise KernelError(f"whose path has {len(str(long))} characters, of which SPICE takes {_LONGEST_PATH}")
+        raise KernelError(f"whose path has {len(str(long))} characters; SPICE takes at most {_LONGEST_PATH}")
     done: list[str] = []
     try:
         for path in paths:

@@ -89,8 +89,8 @@ def read_table(text: str, bits: int, *, narrow: bool = False, format: str | None
         lines, values = lines[::-1], values[::-1]
     back = np.flatnonzero(values[1:, 0] <= values[:-1, 0])
     if len(back):
-        raise TableError(f"line {max(lines[back[0] : back[0] + 2])}: its time doesn't go on from the row "
-                         "before; times must ascend, or descend, from row to row")  # fmt: skip
+        raise TableError(f"line {max(lines[back[0] : back[0] + 2])}: its time doesn't continue the order of "
+                         "the rows before; times must ascend, or descend, from row to row")  # fmt: skip
     columns = dict(zip(factors, np.ascontiguousarray(values.T), strict=True))
     for name in [name for name in columns if name.startswith(_LEFT_OUT)]:
         del columns[name]

@@ -176,7 +176,7 @@ class TabulatedOrbit:
             raise TableError("has rows at unequal distances, over which no window averages; leave window out")
         half = int(window / self.context.convert(steps[0]) / 2)  # rows within it, on either side
         if not 1 <= half <= (len(times) - FEWEST_ROWS) // 2:
-            what = f"has {len(times)} rows, {float(steps[0]):.6g} s apart, of which a window takes"
+            what = f"has {len(times)} rows, {float(steps[0]):.6g} s apart; the window takes"
             raise TableError(f"{what} {2 * half + 1}; 3 to {len(times) - FEWEST_ROWS} are allowed")
         weights = np.cos(np.arange(-half, half + 1) * (np.pi / (2 * half + 2))) ** 2
         weights /= weights.sum()

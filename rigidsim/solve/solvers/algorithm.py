@@ -100,7 +100,7 @@ def algorithm_of(scene: Scene, system: System, *, driven: bool) -> Algorithm:
     try:
         found = kind.of(scene, system, driven=driven)
         if system.crossings and not scene.events and not kind.finds_events:
-            what = "which takes no steps in which it could be found that no body can go on"
+            what = "which takes no steps that could end at an impossible body"
             raise Unsuitable(f'{what} ({system.crossings[0].impossible}); choose method = "taylor"')
         if scene.events and not kind.finds_events:
             takes = "steps in which no" if kind.method.has_steps else "no steps in which"

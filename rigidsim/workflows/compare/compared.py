@@ -218,7 +218,7 @@ def compare(
     _refuse_far(given, float(scene.start), float(scene.samples.last))
     notes = list(given.notes)
     if given.time_unit is None:
-        notes.append("times were taken for s; name a unit if they are in another: t [day]")
+        notes.append("times were taken to be in s; name another unit in the column's name: t [day]")
     own, uncertainty = _own_motion(quiet, given.times, notes)
     given = given.at(slice(own.sizes["time"]))
     motion = own["quaternion"].values, own["angular_velocity"].values
@@ -322,7 +322,7 @@ def _result(seen: Evidence, name: str, files: Mapping[str, str]) -> Comparison:
         if values is not None
     }
     time = ("time", seen.times, {"units": "s", "long_name": "time"})
-    attributes = {"title": f"{source} beside {name}", "kind": "comparison", "verdict": verdict}
+    attributes = {"title": f"{source} compared with {name}", "kind": "comparison", "verdict": verdict}
     floor, beyond, worst = seen.floor[0], errors > seen.floor[0], int(np.argmax(errors))
     first = int(np.argmax(beyond))
     made = Comparison(

@@ -281,7 +281,7 @@ def search(
     while len(seen) < _ROUNDS and _sort_out(weighing, ended):
         kept = b"".join(used.tobytes() for used in weighing.used)
         if kept in seen:
-            notes.append("the outlier rule goes round in circles: rows at its limit stay as they are here")
+            notes.append("the outlier rule alternates between sets of rows; the latest set is kept")
             break
         seen.append(kept)
         left = sum(int((~used).sum()) for used in weighing.used)

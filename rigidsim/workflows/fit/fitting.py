@@ -476,7 +476,7 @@ def _direction_text(keys: Sequence[FitKey], values: np.ndarray, amounts: np.ndar
     if np.isfinite(relative).all() and np.ptp(relative) < 1e-3 * np.abs(relative).max():
         return f"{names}: only their ratios are determined"
     changes = ", ".join(f"{one.key} by {x:.3g}" for one, x in zip(keys, amounts, strict=True))
-    return f"{names}: changed together ({changes}) they leave all rows as they are"
+    return f"{names}: a joint change ({changes}) changes no row"
 
 
 def _finite(value: float) -> float | None:
@@ -528,7 +528,7 @@ def _refuse_other(found: xarray.Dataset, fit: xarray.Dataset, source: str) -> No
 # --- a fit --------------------------------------------------------------------------------------------------
 
 _ALONG_ROWS = 201
-_AGAIN = f"copy it again from where it is whole, or make the fit again ({FORCE})"
+_AGAIN = f"copy it again from an intact copy, or make the fit again ({FORCE})"
 
 Report = Callable[[str], None]
 
@@ -619,7 +619,7 @@ def _refuse(experiment: Experiment) -> None:
         problems.append(Problem("[fit]", "missing; it names parameters and data, see docs/fits.md"))
     if config.sweep is not None:
         one = Remedy("--member N", "[sweep] removed")
-        what = f"asks for many fits, which {SWEEP} makes; with {one} here it is a single one"
+        what = f"asks for many fits: use {SWEEP}, or {one} for a single fit"
         problems.append(Problem("[sweep]", what))
     if config.integrator.precision == "single":
         what = (

@@ -365,7 +365,7 @@ class _Reader:
             raise self._fault("file", f"{what}; name the frames by REF_FRAME_A and REF_FRAME_B in the file")
         if not theirs or (theirs != axes and (theirs not in known or axes is None)):
             what = f'{self.table.file} is about the axes "{theirs}", and the config\'s space axes are '
-            what += f'"{axes}"' if axes else "not named; say by [frame] axes what they are"
+            what += f'"{axes}"' if axes else "not named; name them by [frame] axes"
             allowed = f"attitudes and orbits about one of {', '.join(known)} are allowed"
             raise self._fault("file", f"{what}: {allowed}")
 

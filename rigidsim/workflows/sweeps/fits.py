@@ -99,8 +99,8 @@ def refuse_other_data(files: Sequence[str], beside: Path | None, folder: Path, *
                 raise _gone(given, copy if beside is None else beside / given)
         elif not anew and copy.exists() and digest(copy) != digest(beside / given):
             raise RunFolderError(
-                f"{beside / given}: isn't the file that the sweep was begun with, of which {copy} is a copy; "
-                f"{FORCE} begins anew"
+                f"{beside / given}: differs from {copy}, the copy made when the sweep began; "
+                f"{FORCE} starts again"
             )
 
 
@@ -149,7 +149,7 @@ def _fit_member(sweep: Sweep, member: int, folder: Path) -> MemberResults:
         return _without(Outcome.REFUSED.value, "; ".join(str(problem) for problem in error.problems))
     except RigidsimError as error:
         return _without(Outcome.FAILED.value, str(error))
-    why = {} if result.converged else {0: "the fit didn't converge: its values are where it stopped"}
+    why = {} if result.converged else {0: "the fit didn't converge: its values are the last ones"}
     return MemberResults(_status(Status.FINISHED.value) | _kept(result), why, {"fits": 1})
 
 

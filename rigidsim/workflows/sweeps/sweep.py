@@ -408,8 +408,8 @@ def sweep(
     given = as_experiment(experiment, changes)
     if not isinstance(out, str | os.PathLike):
         what = (
-            f'given {shown(out)}; a folder is allowed, such as "runs" or a temporary one: members are saved '
-            "as they are finished, so that a sweep can be gone on with"
+            f'given {shown(out)}; a folder is allowed, such as "runs" or a temporary one: finished '
+            "members are saved there, so that the sweep can be resumed"
         )
         raise ConfigError(Problem("out", what), given.source)
     folder = SweepFolder(Path(out) / given.config.name)
