@@ -453,7 +453,7 @@ def export(
         options.option(
             "--epoch",
             "TIME",
-            "Date of time 0 if the config has none, for aem, oem, ck, pck and the dates of csv: "
+            "Date of time 0 if the config has none, for all formats but parquet and zarr: "
             '"2029-04-13T21:46:00 TDB".',
         ),
     ] = None,
@@ -518,6 +518,34 @@ def analyse(
     """Find secular rates and spectral lines, labelled with the scene's frequencies: table, dataset, figure.
 
     Example: rigidsim analyse runs/earth_free_nutation --lines 5
+    """
+
+
+@_command("orbits")
+def orbits(
+    planets: Annotated[
+        list[str], typer.Argument(metavar="PLANET...", help="mercury, venus, earth, mars ... neptune.")
+    ],
+    end: Annotated[
+        str, options.option("--end", "TIME", 'Last time, from J2000; negative in the past: "-1 Myr".')
+    ],
+    every: Annotated[str, options.option("--every", "TIME", "From one row to the next.")] = "1 kyr",
+    window: Annotated[
+        str, options.option("--window", "TIME", "Length of the average (Hann's weights); 0 for none.")
+    ] = "1 kyr",
+    kernel: Annotated[
+        str, options.option("--kernel", "NAME", "Installed ephemeris that has the places at J2000.")
+    ] = "de421",
+    out: Annotated[Path, options.option("--out", "DIR", "Folder of the tables, PLANET.csv each.")] = Path(),
+    force: Annotated[bool, options.replacing("Replace tables of these names.")] = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Integrate the planets from J2000 (needs rigidsim[orbits]), and write tables of their averaged elements,
+    which orbit = {table = "PLANET.csv"} reads.
+
+    A million years take some four minutes. Ctrl-C keeps the rows that are there.
+
+    Example: rigidsim orbits earth --end "-10 kyr" --every "400 yr"
     """
 
 

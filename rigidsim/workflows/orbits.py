@@ -1,0 +1,304 @@
+"""``rigidsim orbits``: orbits of the planets over millions of years, as tables of averaged elements.
+
+The eight planets are points under each other's gravity, with the relativistic advance of the perihelia as the
+potential -3 (G M / c r)^2 of the Sun (Nobili & Roxburgh 1986) and the quadrupole of the Earth with its Moon
+(Quinn, Tremaine & Duncan 1991, AJ 101, 2287, with the factor of Varadi, Runnegar & Ghil 2003, ApJ 592, 620).
+They start where a kernel of the Jet Propulsion Laboratory has them at J2000, as barycentres of their systems.
+REBOUND's WHFast (Rein & Tamayo 2015, MNRAS 452, 376) takes steps of 5 days with a symplectic corrector of
+order 11: the map of Wisdom & Holman (1991, AJ 102, 1528).
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+
+from rigidsim.errors import RigidsimError
+from rigidsim.scene.exact import parse_number
+from rigidsim.scene.kernels.reading import KernelError, kernel_of
+from rigidsim.scene.space_axes import obliquity, to_ecliptic
+from rigidsim.scene.validation_messages import nearest, shown
+from rigidsim.session.progress import left_text, meter
+from rigidsim.store.outputs import refuse_loss
+
+PLANETS = ("mercury", "venus", "earth", "mars", "jupiter", "saturn", "uranus", "neptune")
+"""Planets, each with its moons."""
+CHAOTIC = 50e6
+"""Years beyond which an orbit of the Earth is one of many that fit what is known (Laskar et al. 2011, A&A
+532, A89).
+"""
+BEYOND = 3
+"""Rows beyond both ends, with which a table is interpolated there as elsewhere."""
+_EARTH = 1 + PLANETS.index("earth")
+_AU, _LIGHT = 149597870.7, 299792.458  # km, km/s
+_DAY, _YEAR = 86400, 31557600  # s
+_STEP, _LOOK = 5, 500  # days: the longest step, and the longest between two looks, whose mean is within 1e-7
+_MOON_SHARE = 81.30057 / (1 + 81.30057) ** 2  # product of both masses over the square of their sum
+_MOON_DISTANCE = 384400 / _AU
+_MOON_FACTOR = 0.8525  # for the Moon's eccentricity, inclination and perturbed orbit (Varadi et al. 2003)
+_HEAD = """# {planet}, from J2000 to {end}: elements about the Sun, averaged over {window} by Hann's weights.
+# Ecliptic and equinox of J2000. Eight planets from {kernel}, with relativity and the quadrupole of Earth and
+# Moon, by REBOUND's WHFast (rigidsim orbits). The mean of the semi-major axis is given in the last line.
+time [yr], eccentricity, inclination [deg], ascending_node [deg], longitude_of_periapsis [deg]
+"""
+
+
+@dataclass(frozen=True)
+class Orbits:
+    """What was written.
+
+    Attributes:
+        files: a table per planet.
+        rows: rows of each. reached: time of the last one, years since J2000.
+        axes: means of the semi-major axes by planet, au.
+        complete: False after Ctrl-C.
+    """
+
+    files: list[Path]
+    rows: int
+    reached: float
+    axes: dict[str, float]
+    complete: bool
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return vars(self) | {"files": list(map(str, self.files))}
+
+
+@dataclass(frozen=True)
+class _Rhythm:
+    """Steps (days, with the sign of time), so that looks and rows are at whole numbers of them.
+
+    Attributes:
+        looks: from one row to the next. half: looks on both sides of a row that are averaged.
+        rows: asked for, from J2000 to the end, without those beyond.
+    """
+
+    step: float
+    steps: int
+    looks: int
+    half: int
+    rows: int
+    every: float
+
+    @property
+    def first(self) -> int:
+        """Number of the first look, counted from J2000."""
+        return -BEYOND * self.looks - self.half
+
+    def year(self, row: int) -> float:
+        """Years since J2000 of a row."""
+        return math.copysign(self.every, self.step) * row / _YEAR + 0.0  # no -0
+
+
+def write_orbits(
+    planets: Sequence[str],
+    end: Any,
+    *,
+    every: Any = "1 kyr",
+    window: Any = "1 kyr",
+    kernel: str = "de421",
+    out: str | Path = ".",
+    force: bool = False,
+) -> Orbits:
+    """Integrate the planets from J2000 to ``end``, and write ``PLANET.csv`` of those named, row by row.
+
+    Args:
+        planets: names from ``PLANETS``; all eight are integrated.
+        end: before J2000 if negative. every: from one row to the next. window: length of the average; 0 for
+            osculating elements. All in s, or with a unit ("-1 Myr").
+        kernel: an installed package of an ephemeris, as ``[ephemeris] kernel``.
+        out: folder of the tables. force: whether they may replace files.
+
+    Returns:
+        What was written, also after Ctrl-C.
+
+    Raises:
+        RigidsimError: an argument isn't allowed, or REBOUND is missing.
+    """
+    for name in planets:
+        if name not in PLANETS:
+            raise RigidsimError(f"PLANET: given {shown(name)}{nearest(name, PLANETS)}; allowed: {', '.join(PLANETS)}")
+    rhythm = _rhythm(
+        *(_seconds(f"--{k}", v) for k, v in (("end", end), ("every", every), ("window", window)))
+    )
+    missing = [name for name in ("rebound", "numba") if find_spec(name) is None]
+    if missing:
+        raise RigidsimError(
+            f'rigidsim orbits needs {" and ".join(missing)}, which is missing: pip install "rigidsim[orbits]"'
+        )
+    start = _start(kernel)
+    names = list(dict.fromkeys(planets))
+    files = [Path(out) / f"{name}.csv" for name in names]
+    refuse_loss(files, [], force=force)
+    begin, rows, reached, axes, complete = time.perf_counter(), 0, 0.0, np.zeros(len(names)), True
+    with ExitStack() as stack:
+        show = stack.enter_context(meter())
+        show.name = "orbits"
+        show.phase(f"integrating the planets to {end}")
+        opened = [stack.enter_context(file.open("w", encoding="utf-8", newline="\n")) for file in files]
+        for name, file in zip(names, opened, strict=True):
+            file.write(_HEAD.format(planet=name.title(), end=end, window=window, kernel=kernel))
+        try:
+            for row, means in _averages(start, rhythm, [1 + PLANETS.index(name) for name in names]):
+                for file, (k, h, ix, iy, _) in zip(opened, means, strict=True):
+                    angles = 2 * math.asin(math.hypot(ix, iy) / 2), math.atan2(iy, ix), math.atan2(h, k)
+                    degrees = ", ".join(f"{math.degrees(x):.10f}" for x in angles)
+                    file.write(f"{rhythm.year(row):.12g}, {math.hypot(k, h):.12f}, {degrees}\n")
+                    file.flush()
+                rows, axes, reached = rows + 1, axes + means[:, 4], rhythm.year(row)
+                share = (row + BEYOND) / (rhythm.rows + 2 * BEYOND)
+                left = left_text(time.perf_counter() - begin, share)
+                show.update(share, f"{100 * share:.1f} %, t = {reached / 1000:,.6g} kyr, {left}")
+        except KeyboardInterrupt:
+            complete = False
+        means = dict(zip(names, (axes / max(rows, 1)).tolist(), strict=True))
+        for file, axis in zip(opened, means.values(), strict=True):
+            file.write(f"# mean semi-major axis {axis:.10f} au\n")
+    return Orbits(files, rows, reached, means, complete)
+
+
+def _seconds(option: str, given: Any) -> float:
+    try:
+        return float(parse_number(given, "s"))
+    except ValueError as error:
+        raise RigidsimError(f"{option}: {error}") from None
+
+
+def _rhythm(end: float, every: float, window: float) -> _Rhythm:
+    if every <= 0 or window < 0:
+        raise RigidsimError(
+            f"--every, --window: given {every:g} s and {window:g} s; positive lengths of time are allowed, "
+            "and a window of 0 for osculating elements"
+        )
+    rows = math.ceil(abs(end) / every - 1e-9)
+    if rows < 1:
+        raise RigidsimError(
+            f"--end: given {end:g} s; a time other than J2000 is allowed, such as --end '-1 Myr'"
+        )
+    looks = math.ceil(every / (_LOOK * _DAY))
+    steps = math.ceil(every / (_STEP * _DAY * looks))
+    half = round(window / 2 / (every / looks))
+    return _Rhythm(math.copysign(every / (_DAY * looks * steps), end), steps, looks, half, rows, every)
+
+
+def _start(name: str) -> np.ndarray:
+    """G M, place and velocity of the Sun and the planets at J2000, (9, 7), in au and days, ecliptic."""
+    context = mpmath.MPContext()
+    found = []
+    try:
+        kernel = kernel_of(name, "")
+        for body in ("sun", *PLANETS):
+            body = "earth_moon_barycenter" if body == "earth" else body
+            strength, sight = kernel.strength(body), kernel.sight(body, "")
+            if strength is None:
+                raise KernelError("which has no gravitational parameters; an installed package of an "
+                                  "ephemeris is allowed: de405, de421, de423 (pip install NAME)")  # fmt: skip
+            first, last = sight.span
+            if not first <= 0 <= last:
+                raise KernelError("which doesn't reach J2000; one that does is allowed, such as de421")
+            place, velocity = (
+                [float(x) / _AU * _DAY**order
+                 for x in to_ecliptic(sight.at(context, context.zero, order), obliquity(context))]
+                for order in (0, 1)
+            )  # fmt: skip
+            found.append([float(strength) / 1e9 / _AU**3 * _DAY**2, *place, *velocity])
+    except KernelError as error:
+        raise RigidsimError(f"--kernel: given {shown(name)}, {error}") from None
+    return np.array(found)
+
+
+def _averages(start: np.ndarray, rhythm: _Rhythm, bodies: list[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """Rows by number, with the means of the bodies' elements (bodies, 5)."""
+    before = _Sun(start, -rhythm.step)
+    before.advance(-rhythm.first * rhythm.steps)
+    planets = _Sun(before.state(), rhythm.step)
+    weights = np.cos(np.pi * np.arange(-rhythm.half, rhythm.half + 1) / (2 * rhythm.half + 2)) ** 2
+    weights /= weights.sum()
+    seen: list[np.ndarray] = []
+    last = (rhythm.rows + BEYOND) * rhythm.looks + rhythm.half
+    for look in range(rhythm.first, last + 1):
+        seen = [*seen[max(0, len(seen) - 2 * rhythm.half) :], planets.elements(bodies)]
+        row, rest = divmod(look - rhythm.half, rhythm.looks)
+        if not rest and len(seen) == len(weights):
+            yield row, np.tensordot(weights, np.array(seen), 1)
+        planets.advance(rhythm.steps)
+
+
+class _Sun:
+    """The Sun with its planets in REBOUND."""
+
+    def __init__(self, state: np.ndarray, step: float) -> None:
+        import rebound
+
+        self._simulation = rebound.Simulation()
+        self._simulation.G = 1.0
+        for m, x, y, z, vx, vy, vz in state:
+            self._simulation.add(m=m, x=x, y=y, z=z, vx=vx, vy=vy, vz=vz)
+        self._simulation.move_to_com()
+        self._simulation.integrator = "whfast"
+        whfast = self._simulation.integrator
+        # looks leave the motion as it is
+        whfast.corrector, whfast.safe_mode, whfast.keep_unsynchronized = 11, 0, 1
+        self._simulation.dt = step
+        self._forces = _forces(len(state))
+        self._simulation.additional_forces = self._forces.address
+
+    def advance(self, steps: int) -> None:
+        """Take steps."""
+        self._simulation.steps(steps)
+
+    def state(self) -> np.ndarray:
+        """G M, places and velocities, (bodies, 7)."""
+        self._simulation.synchronize()
+        return np.array([[p.m, *p.xyz, *p.vxyz] for p in self._simulation.particles])
+
+    def elements(self, bodies: list[int]) -> np.ndarray:
+        """Osculating e cos and e sin of the longitude of perihelion, 2 sin(i / 2) times cos and sin of the
+        node's, and the semi-major axis (au), about the Sun, (bodies, 5).
+        """
+        self._simulation.synchronize()
+        sun = self._simulation.particles[0]
+        found = [self._simulation.particles[i].orbit(primary=sun) for i in bodies]
+        return np.array([[x.pal_k, x.pal_h, x.pal_ix, x.pal_iy, x.a] for x in found])
+
+
+def _forces(count: int) -> Any:
+    """Compiled accelerations of relativity and of the Moon, which REBOUND calls at each step."""
+    import numba
+    import rebound
+
+    particle = rebound.Particle
+    size, pushed, mass = (x // 8 for x in (ctypes.sizeof(particle), particle.ax.offset, particle.m.offset))
+    place = rebound.Simulation._particles.offset // 8
+    relativity = 6 / (_LIGHT / _AU * _DAY) ** 2
+    moon = 0.75 * _MOON_FACTOR * _MOON_SHARE * _MOON_DISTANCE**2
+    types = numba.types
+
+    @numba.cfunc(types.void(types.CPointer(types.CPointer(types.float64))))
+    def forces(simulation: Any) -> None:
+        p = simulation[place]
+        sun = p[mass]
+        for body in range(1, count):
+            i = body * size
+            x, y, z = p[i] - p[0], p[i + 1] - p[1], p[i + 2] - p[2]
+            r2 = x * x + y * y + z * z
+            pull = relativity * sun * sun / (r2 * r2)
+            if body == _EARTH:
+                pull += moon * sun / (r2 * r2 * math.sqrt(r2))
+            back = pull * p[i + mass] / sun
+            for axis, along in enumerate((x, y, z)):
+                p[i + pushed + axis] -= pull * along
+                p[pushed + axis] += back * along
+
+    return forces
