@@ -40,7 +40,7 @@ def named_epoch(naming: Naming, attributes: Mapping[str, Any]) -> Epoch:
         raise RigidsimError(f"--epoch: {error}") from None
     if not known and epoch is None:
         raise RigidsimError(
-            "the run doesn't say what its time 0 is, which a message must: give [time] epoch in the config, "
+            "the run doesn't say what its time 0 is, which this format needs: give [time] epoch in the config, "
             'or --epoch "2029-04-13T21:46:00 TDB" here (scales TDB, TT, TAI, GPS and UTC)'
         )
     if known and epoch is not None and str(epoch) != known:
@@ -95,6 +95,8 @@ _PLACES = {
     "oem": ("ccsds", "OEM", "", ""),
     "ck": ("spice", "CK", "spiceypy", "spice"),
     "pck": ("spice", "PCK", "spiceypy", "spice"),
+    "snvec": ("climate", "SNVEC", "", ""),
+    "la2004": ("climate", "LA2004", "", ""),
 }
 """Module and name of each ``Format``, and a package that it needs besides rigidsim's own requirements, with
 the extra that brings it.

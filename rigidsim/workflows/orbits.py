@@ -128,7 +128,9 @@ def write_orbits(
     """
     for name in planets:
         if name not in PLANETS:
-            raise RigidsimError(f"PLANET: given {shown(name)}{nearest(name, PLANETS)}; allowed: {', '.join(PLANETS)}")
+            raise RigidsimError(
+                f"PLANET: given {shown(name)}{nearest(name, PLANETS)}; allowed: {', '.join(PLANETS)}"
+            )
     rhythm = _rhythm(
         *(_seconds(f"--{k}", v) for k, v in (("end", end), ("every", every), ("window", window)))
     )

@@ -9,6 +9,7 @@ from support import loaded
 
 import rigidsim
 from rigidsim.accuracy.reversal import there_and_back
+from rigidsim.formats.registry import Naming
 from rigidsim.workflows.check import check
 
 YEAR = 365.25 * 86400
@@ -103,6 +104,56 @@ def test_the_past_is_that_of_the_equations_of_the_literature(config: Path, geode
     for name, values in known.items():
         found = data[name].sel(axis="figure") if "axis" in data[name].dims else data[name]
         np.testing.assert_allclose(found.values, values, rtol=0, atol=5e-8 if name == "insolation" else 1e-10)
+
+
+@pytest.mark.parametrize("precision", ["double", "quadruple"])
+def test_exports_have_the_columns_of_published_solutions(
+    config: Path, tmp_path: Path, precision: str
+) -> None:
+    record = ["obliquity", "precession", "climatic_precession", "orbit_eccentricity"]
+    changes = {
+        "output.record": [*record, "longitude_of_perihelion_of_date"], "output.insolation": None,
+        "integrator.precision": precision,
+    }  # fmt: skip
+    rigidsim.run(rigidsim.load(config).replace(changes), out=tmp_path)
+    folder, out = tmp_path / "deep", tmp_path / "out"
+    years = np.arange(0, END - 1, -2000.0)
+    known = truth(years)
+    kh = elements(years)[:2]
+    angle = np.arctan2(kh[1], kh[0]) - known["precession"]
+    perihelion = angle + (np.arcsin(known["climatic_precession"] / np.hypot(*kh))[0] - angle[0])
+    expected = {
+        "snvec": [
+            known["obliquity"],
+            np.angle(np.exp(1j * known["precession"])),
+            known["climatic_precession"],
+        ],
+        "la2004": [known["orbit_eccentricity"], known["obliquity"], perihelion % (2 * np.pi)],
+    }
+    for name, columns in expected.items():
+        rigidsim.export(folder, name, out, naming=Naming(epoch="J2000"), force=True)
+        found = np.loadtxt(out).T
+        np.testing.assert_array_equal(found[0], years / 1000)
+        np.testing.assert_allclose(found[1:], columns, rtol=0, atol=1e-10)
+        digits = {len(cell.lstrip("-").partition("e")[0]) for cell in out.read_text().split()}
+        assert digits == {18 if precision == "double" else 37}
+        rigidsim.export(folder, name, out, naming=Naming(epoch="1950-01-01T12:00:00 TDB"), force=True)
+        np.testing.assert_allclose(np.loadtxt(out)[:, 0], years / 1000 - 18262 / 365250, rtol=1e-15, atol=0)
+
+
+def test_exports_of_what_a_run_has_not_are_refused(config: Path, tmp_path: Path) -> None:
+    scene = rigidsim.load(config)
+    rigidsim.run(scene, out=tmp_path)
+    rigidsim.run(scene.replace({"frame.reference": [0, 0, 1], "name": "fixed"}), out=tmp_path)
+    named = Naming(epoch="J2000")
+    for folder, name, says in (
+        ("deep", "la2004", "the run has no longitude_of_perihelion_of_date"),
+        ("fixed", "snvec", r'set \[frame\] reference = "orbit"'),
+    ):
+        with pytest.raises(rigidsim.RigidsimError, match=says):
+            rigidsim.export(tmp_path / folder, name, tmp_path / "out", naming=named)
+    with pytest.raises(rigidsim.RigidsimError, match="what its time 0 is"):
+        rigidsim.export(tmp_path / "deep", "snvec", tmp_path / "out")
 
 
 def test_keys_of_averages_are_refused_without_one(config: Path) -> None:
