@@ -40,8 +40,8 @@ def named_epoch(naming: Naming, attributes: Mapping[str, Any]) -> Epoch:
         raise RigidsimError(f"--epoch: {error}") from None
     if not known and epoch is None:
         raise RigidsimError(
-            "the run doesn't say what its time 0 is, which this format needs: give [time] epoch in the config, "
-            'or --epoch "2029-04-13T21:46:00 TDB" here (scales TDB, TT, TAI, GPS and UTC)'
+            "the run doesn't say what its time 0 is, which this format needs: give [time] epoch in the "
+            'config, or --epoch "2029-04-13T21:46:00 TDB" here (scales TDB, TT, TAI, GPS and UTC)'
         )
     if known and epoch is not None and str(epoch) != known:
         raise RigidsimError(f"--epoch: given {epoch}, but time 0 of the run is {known}; leave the option out")
