@@ -16,6 +16,7 @@ from pydantic import ValidationError
 
 from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.scene import validation_messages as messages
+from rigidsim.scene.bodies.files import is_mesh, moments_of
 from rigidsim.scene.bodies.gravity_field import asked_degree, cut
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import NAME_OR_VECTOR
@@ -308,6 +309,10 @@ def _table_sections(config: Config, folder: Path) -> str:
         orbit = getattr(one, "elements", None)
         if orbit is not None and orbit.table is not None:
             named.append((f"[[loads]] number {number} {orbit.key}.table", orbit.table, _whole))
+    parts = ((f"parts[{number}].", part) for number, part in enumerate(config.body.parts or []))
+    for place, solid in (("", config.body), *parts):
+        if solid.file is not None:
+            named.append((f"[body] {place}file", solid.file, _mesh if is_mesh(solid.file) else _whole))
     field = config.body.gravity_field
     if field is not None and field.file is not None:
         degree = asked_degree(field, config.loads, config.sweep)
@@ -341,7 +346,7 @@ def _text(where: str, name: str, path: Path, read: Callable[[TextIO], str]) -> s
         raise fault(what) from None
     except UnicodeDecodeError:
         raise fault(", which is not UTF-8 text; save it as such") from None
-    except ValueError as error:  # of a table without times
+    except ValueError as error:  # of a table without times, or a mesh without a volume
         raise fault(f": {error}") from None
     what = f", which has more than {_LARGEST_TABLE} characters; keep the rows and digits that the run needs"
     ensure(len(text) <= _LARGEST_TABLE, fault(what))
@@ -353,6 +358,10 @@ def _text(where: str, name: str, path: Path, read: Callable[[TextIO], str]) -> s
 
 def _whole(file: TextIO) -> str:
     return file.read(_LARGEST_TABLE + 1)
+
+
+def _mesh(file: TextIO) -> str:
+    return moments_of(Path(file.name))  # which may be binary
 
 
 def _times_of(file: TextIO) -> str:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.scene import starts, units
 from rigidsim.scene.arithmetic import Matrix, Vector, context_for, cross, diagonal, dot, eigen
-from rigidsim.scene.bodies.body import RigidBody, build_body, inverse_inertia
+from rigidsim.scene.bodies.body import RigidBody, build_body, field_of_mesh, inverse_inertia
 from rigidsim.scene.bodies.gravity_field import asked_degree, gravity_field_of
 from rigidsim.scene.bodies.outside import surfaces_of, with_surfaces
 from rigidsim.scene.config import Experiment
@@ -293,17 +293,16 @@ def _orientation(setting: Setting, source: str) -> Orientation | None:
 
 def _body_at_start(config: Config, context: Any) -> RigidBody:
     moments = moments_at_start(config, context, config.time.start.at(context))
-    body = build_body(config.body, context, config.integrator.euler_sequence, moments)
+    body = build_body(config.body, context, config.integrator.euler_sequence, moments, config.texts)
     outside = surfaces_of(config.body.surfaces, body.center_of_mass, context)
     if outside:
         drawing = with_surfaces(body.drawing, config.body.surfaces, outside)
         body = replace(body, surfaces=outside, drawing=drawing)
-    if config.body.gravity_field is None:
+    field = config.body.gravity_field or field_of_mesh(config.body, config.texts)
+    if field is None:
         return body
-    degree = asked_degree(config.body.gravity_field, config.loads)
-    return replace(
-        body, gravity=gravity_field_of(config.body.gravity_field, body, context, config.texts, degree)
-    )
+    degree = asked_degree(field, config.loads)
+    return replace(body, gravity=gravity_field_of(field, body, context, config.texts, degree))
 
 
 def _fail(table: str, key: str, text: str) -> ConfigError:

@@ -109,8 +109,7 @@ OUT_OF_SCOPE = (
     OutOfScope(
         "a second rigid body isn't modelled",
         (
-            "binary", "full_two_body", "f2bp", "secondary", "mutual_potential", "polyhedron", "shape_model",
-            "mesh",
+            "binary", "full_two_body", "f2bp", "secondary", "mutual_potential",
         ),
         "one of them turns, and its partner is a point mass ([[bodies]] with coupling) or has a "
         "figure (J2); irregular bodies are [body] gravity_field",

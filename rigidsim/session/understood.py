@@ -43,6 +43,7 @@ def body_of(scene: Scene) -> UnderstoodBody:
         principal_axes=tuple(tuple(float(x) for x in axis) for axis in body.principal_axes),
         mass=None if body.mass is None else float(body.mass),
         center_of_mass=_three(body.center_of_mass),
+        reference=None if body.reference is None else _three(body.reference),
     )
 
 

@@ -288,7 +288,8 @@ _LARGEST_FILE = 16_000_000  # bytes; a summary has some kilobytes
 
 class UnderstoodBody(SummaryPart):
     """Where the inertia came from; principal moments (kg m^2) and axes (rows, body axes), mass (kg), and the
-    centre of mass from the point that the body turns about (body axes, m).
+    centre of mass from the point that the body turns about (body axes, m), which is at ``reference`` in the
+    coordinates that describe its pieces.
     """
 
     source: Text
@@ -296,6 +297,7 @@ class UnderstoodBody(SummaryPart):
     principal_axes: tuple[tuple[FiniteNumber, ...], ...]
     mass: FiniteNumber | None
     center_of_mass: Three | None = None
+    reference: Three | None = None
 
 
 class FoundStart(SummaryPart):

@@ -71,7 +71,7 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
         ('"2 kg m"', 'given "2 kg m"', 'a value in "kg m", where "kg m^2" is needed'),
     ],
     "part": [
-        ('colour = "red"', "colour", "unknown key", "allowed: euler_angles"),
+        ('colour = "red"', "colour", "unknown key", "euler_angles, euler_sequence"),
         ("quaternion = [1, 0, 0, 0], euler_angles = [0, 0, 0]", "euler_angles", "given with quaternion"),
     ],
     "ball": [

@@ -46,6 +46,9 @@ def body_text(body: UnderstoodBody) -> str:
         parts.append(f"centre of mass at ({_numbers(body.center_of_mass)}) m from the point it turns about")
     elif body.center_of_mass is not None:
         parts.append("turns about its centre of mass")
+    if body.reference is not None and any(body.reference):
+        place = f"at ({_numbers(body.reference)}) m of its description"
+        parts.append(f"{place}, to which tensors are moved by the parallel-axis theorem")
     moments = f"principal moments {_numbers(body.principal_moments)} kg m^2 about "
     axes = [_direction(axis) for axis in body.principal_axes]
     return ", ".join(parts) + "\n" + moments + ", ".join(axes)

@@ -8,9 +8,10 @@ tensor, or made of pieces (points, a shape, or parts placed and rotated), each w
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import (
     BaseModel,
@@ -18,6 +19,7 @@ from pydantic import (
     StrictBool,
     StrictStr,
     Tag,
+    ValidationError,
     WithJsonSchema,
     create_model,
     model_validator,
@@ -25,7 +27,19 @@ from pydantic import (
 
 from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.scene import attitude
-from rigidsim.scene.arithmetic import Matrix, Vector, diagonal, dot, eigen, minus, multiply, transpose, vector
+from rigidsim.scene.arithmetic import (
+    Matrix,
+    Vector,
+    apply,
+    diagonal,
+    dot,
+    eigen,
+    minus,
+    multiply,
+    transpose,
+    vector,
+)
+from rigidsim.scene.bodies.files import is_mesh, link_inertia, mesh_moments
 from rigidsim.scene.bodies.gravity_field import GravityField, GravityFieldTable
 from rigidsim.scene.bodies.outside import OuterSurface, SurfaceTable
 from rigidsim.scene.bodies.presets import PRESETS, Preset
@@ -40,6 +54,7 @@ from rigidsim.scene.fields import (
     EachOnce,
     EulerSequence,
     Four,
+    InUnit,
     Kilogram,
     Metre,
     Moment,
@@ -50,15 +65,19 @@ from rigidsim.scene.fields import (
     Positive,
     Range,
     Rate,
+    Rule,
     Second,
     Triple,
     name_or_vector,
+    one_of,
+    only_with,
     within,
 )
 from rigidsim.scene.paths import numbers
 from rigidsim.scene.swept import plain
 from rigidsim.scene.validation_messages import shown
 
+_TENSORS = ("principal_moments", "inertia_tensor")
 _SIZES = {
     "size": "edges along x, y (and z)",
     "semi_axes": "half the axes along x, y, z",
@@ -81,9 +100,23 @@ class PointMass(ConfigTable):
     """position in body axes"""
 
 
+Density = Annotated[ExactNumber, InUnit("kg/m^3")]
+
+
 class _Shaped(ConfigTable):
+    rules: ClassVar[tuple[Rule, ...]] = (only_with("file", "link", "density", "unit"),)
     shape: Annotated[str, OneOf(SHAPES)] | None = None
     """a homogeneous solid; needs mass and dimensions"""
+    file: StrictStr | None = Field(None, examples=["boom.stl", "arm.urdf"])
+    """a file next to the config: a mesh of uniform density (.stl, .obj, .ply, .off; with mass or density), or
+    a robot's links with their inertia (.urdf, .xml of MuJoCo)
+    """
+    link: StrictStr | None = Field(None, examples=["upper_arm"])
+    """name of the link, or MuJoCo's body, in the file; needed if it has several"""
+    density: Positive[Density] | None = Field(None, examples=["2700 kg/m^3"])
+    """of a mesh, instead of mass"""
+    unit: StrictStr | None = Field(None, examples=["mm"])
+    """of lengths in a mesh; m by default"""
 
 
 def _dimension(key: str, count: int) -> Any:
@@ -110,14 +143,23 @@ else:
 
 
 class Part(Solid):
-    """One solid of a composite body, placed by its centre of mass, turned by a quaternion or Euler angles."""
+    """One piece of a composite body, placed by its origin, turned by a quaternion or Euler angles."""
 
-    shape: Annotated[str, OneOf(SHAPES)]
-    """a homogeneous solid; needs mass and dimensions"""
-    mass: Positive[Kilogram]
+    rules = (*_Shaped.rules, one_of("shape", *_TENSORS, "file"))
+    principal_moments: Triple[Moment] | None = None
+    """principal moments along the part's own axes; needs mass"""
+    inertia_tensor: Triple[Triple[Moment]] | None = None
+    """inertia tensor along the part's own axes (products are -sum m x y); needs mass"""
+    about: Literal["center_of_mass", "origin"] = "center_of_mass"
+    """point that moments or tensor refer to; from the part's origin they are moved to the centre of mass by
+    the parallel-axis theorem
+    """
+    center_of_mass: Triple[Metre] | None = None
+    """of moments or a tensor: centre of mass, from the part's origin along its own axes; by default there"""
+    mass: Positive[Kilogram] | None = None
     """mass of the part"""
     position: Triple[Metre] = Field([ZERO] * 3)
-    """position of its centre of mass, in body axes"""
+    """position of its origin in body axes: a shape's centre of mass, the origin of a file's coordinates"""
     quaternion: Four[Dimensionless] | None = None
     """attitude w, x, y, z: takes the part's own axes to the body's"""
     euler_angles: Triple[Angle] | None = None
@@ -234,7 +276,7 @@ class Body(Solid):
 
 # --- worked out ---------------------------------------------------------------------------------------------
 
-SOURCES = ("principal_moments", "inertia_tensor", "points", "shape", "parts", "preset")
+SOURCES = (*_TENSORS, "points", "shape", "file", "parts", "preset")
 # A tensor that was printed by a double-precision program obeys the triangle inequality to about this.
 _ROUNDING_OF_INPUT = 1e-14
 
@@ -262,6 +304,7 @@ class RigidBody:
         source: key that the inertia came from, with the preset's reference if there is one.
         gravity: its gravity beyond the inertia tensor; None if the config gives none.
         surfaces: its outside, as light and air meet it.
+        reference: the reference point in the coordinates of the description; None without pieces.
     """
 
     mass: Any | None
@@ -273,6 +316,7 @@ class RigidBody:
     drawing: list[dict[str, Any]] = field(default_factory=list)
     gravity: GravityField | None = None
     surfaces: tuple[OuterSurface, ...] = ()
+    reference: Vector | None = None
 
 
 @dataclass
@@ -292,12 +336,19 @@ def refusal(key: str, text: str) -> ConfigError:
     return ConfigError(Problem(f"[body] {key}".strip(), text))
 
 
-def build_body(table: Body, context: Any, sequence: str = "zxz", moments: Vector | None = None) -> RigidBody:
+def build_body(
+    table: Body,
+    context: Any,
+    sequence: str = "zxz",
+    moments: Vector | None = None,
+    texts: Mapping[str, str] | None = None,
+) -> RigidBody:
     """Work out the body of ``[body]``.
 
     Args:
         sequence: of Euler angles for parts that name none.
         moments: principal moments at the start, if some are expressions (mpf).
+        texts: of files, by name.
     """
     preset = PRESETS[str(table.preset)] if table.preset is not None else None
     own = [name for name in SOURCES[:-1] if getattr(table, name) is not None]
@@ -311,15 +362,17 @@ def build_body(table: Body, context: Any, sequence: str = "zxz", moments: Vector
     ensure(table.dynamical_ellipticity is None or flattened, refusal("dynamical_ellipticity", what))
     if source != "shape":
         _refuse_dimensions(table, (), "which only a shape has", "")
+    pieces = _Pieces(context, sequence, texts or {})
     if not own and preset and preset.parts:
         parts = [Part.model_validate(dict(part)) for part in preset.parts]
-        return _from_pieces(table.model_copy(update={"parts": parts}), "parts", context, sequence, preset)
-    if source not in ("points", "shape", "parts"):
+        return _from_pieces(table.model_copy(update={"parts": parts}), "parts", pieces, preset)
+    if source not in ("points", "shape", "file", "parts"):
         return _from_tensor(table, source, context, preset, moments)
-    ensure(source == "shape" or table.mass is None, refusal("mass", f"it follows from {source}; remove it"))
+    free = source in ("shape", "file") or table.mass is None
+    ensure(free, refusal("mass", f"it follows from {source}; remove it"))
     if preset and source == "shape" and table.mass is None and preset.mass:
         table = table.model_copy(update={"mass": parse_number(preset.mass, "kg")})
-    return _from_pieces(table, source, context, sequence)
+    return _from_pieces(table, source, pieces)
 
 
 def _from_tensor(
@@ -354,27 +407,24 @@ def _from_tensor(
     return _finish(context, table, source, mass, center, inertia, drawing)
 
 
-def _check_symmetric(tensor: list[list[ExactNumber]]) -> None:
+def _check_symmetric(tensor: list[list[ExactNumber]], place: str = "") -> None:
     for i, j in ((1, 0), (2, 0), (2, 1)):
         what = (
             f"given {float(tensor[i][j])!r}, but [{j}][{i}] is {float(tensor[j][i])!r}; the tensor must be "
         )
         what += "symmetric: write the same number twice"
-        ensure(tensor[i][j] == tensor[j][i], refusal(f"inertia_tensor[{i}][{j}]", what))
+        ensure(tensor[i][j] == tensor[j][i], refusal(f"{place}inertia_tensor[{i}][{j}]", what))
 
 
-def _from_pieces(
-    table: Body, source: str, context: Any, sequence: str, preset: Preset | None = None
-) -> RigidBody:
+def _from_pieces(table: Body, source: str, maker: _Pieces, preset: Preset | None = None) -> RigidBody:
     """The body of pieces; a preset's pieces are scaled to another mass of the same shape."""
-    named = "preset" if preset else source
+    named, context = "preset" if preset else source, maker.context
     what = f"it follows from {named}; remove it, and say with reference what the body turns about"
     ensure(table.center_of_mass is None, refusal("center_of_mass", what))
-    if source == "shape":
-        pieces = [_solid(table, "", context, sequence)]
+    if source in ("shape", "file"):
+        pieces = [maker.made(table, "")]
     elif source == "parts":
-        places = enumerate(table.parts or [])
-        pieces = [_solid(part, f"parts[{number}].", context, sequence) for number, part in places]
+        pieces = [maker.placed(part, f"parts[{number}].") for number, part in enumerate(table.parts or [])]
     else:
         zero, point = diagonal([context.zero] * 3), {"solid": "point"}
         given = [(one.mass.at(context), vector(context, one.position)) for one in table.points or []]
@@ -392,15 +442,20 @@ def _from_pieces(
     drawing = []
     for piece in pieces:
         arm = minus(piece.position, reference)
-        square = dot(arm, arm)  # Steiner's theorem
-        for i, row in enumerate(inertia):
-            for j in range(3):
-                shift = piece.mass * ((square if i == j else 0) - arm[i] * arm[j])
-                row[j] = row[j] + (piece.inertia[i][j] + shift)
+        own = _moved(piece.inertia, piece.mass, arm)
+        inertia = [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(inertia, own, strict=True)]
         drawing.append({**piece.drawing, "position": [float(plain(x)) for x in arm]})
         if piece.drawing["solid"] == "point":
             drawing[-1]["dimensions"] = {"mass_fraction": float(plain(piece.mass / total))}
-    return _finish(context, table, named, total, minus(center, reference), inertia, drawing)
+    body = _finish(context, table, named, total, minus(center, reference), inertia, drawing)
+    return replace(body, reference=reference)
+
+
+def _moved(inertia: Matrix, mass: Any, arm: Vector) -> Matrix:
+    """A tensor moved from the centre of mass by an arm (Steiner's theorem); back by a negative mass."""
+    square = dot(arm, arm)
+    shift = [[mass * ((square if i == j else 0) - arm[i] * arm[j]) for j in range(3)] for i in range(3)]
+    return [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(inertia, shift, strict=True)]
 
 
 def _reference_point(table: Body, source: str, center: Vector, context: Any) -> Vector:
@@ -424,36 +479,135 @@ def _lengths(table: Solid, key: str) -> list[Any]:
     return value if isinstance(value, list) else [value]
 
 
-def _solid(table: Body | Part, place: str, context: Any, sequence: str) -> _Piece:
-    """A shape, or a part, whose keys stand at a place of ``[body]``."""
-    name = str(table.shape)
-    shape = SHAPES[name]
-    _refuse_dimensions(table, tuple(shape.dimensions), f"that a {name} doesn't have", place)
-    dimensions = {}
-    for key, count in shape.dimensions.items():
-        values, where = _lengths(table, key), f"{place}{key}"
-        lengths = "a positive length" if count == 1 else f"{count} positive lengths"
-        ensure(values != [None], refusal(where, f"missing; a {name} needs it: {lengths}"))
-        ensure(len(values) == count, refusal(where, f"given {len(values)} lengths; a {name} has {count}"))
-        dimensions[key] = vector(context, values)
-    for small, large in [shape.at_most] if shape.at_most else []:
-        given, limit = (context.nstr(dimensions[key][0], 12) for key in (small, large))
-        what = f"given {given} m; at most {large} ({limit} m) is allowed"
-        ensure(dimensions[small][0] <= dimensions[large][0], refusal(f"{place}{small}", what))
-    if table.mass is None:
-        raise refusal(f"{place}mass", "missing; this body needs a mass, a positive number")
-    mass = table.mass.at(context)
-    inertia = diagonal([mass * m for m in shape.moments(context, dimensions)])
-    plainly = {k: [float(plain(x)) for x in v] for k, v in dimensions.items()}
-    sizes = {k: (v if shape.dimensions[k] > 1 else v[0]) for k, v in plainly.items()}
-    position = vector(context, getattr(table, "position", None))
-    drawing = _drawn(name, sizes, position)
-    turned = _attitude_of(table, sequence, place, context) if isinstance(table, Part) else None
-    if turned is not None:
-        turn = attitude.rotation_matrix(turned[0])
-        inertia = multiply(multiply(turn, inertia), transpose(turn))
-        drawing["quaternion"] = [float(plain(x)) for x in turned[0]]
-    return _Piece(mass, position, inertia, drawing)
+@dataclass(frozen=True)
+class _Pieces:
+    """Makes pieces of the tables whose keys stand at a place of ``[body]``.
+
+    Attributes:
+        sequence: of Euler angles for parts that name none.
+        texts: of files, by name.
+    """
+
+    context: Any
+    sequence: str
+    texts: Mapping[str, str]
+
+    def placed(self, part: Part, place: str) -> _Piece:
+        """A part where it is in the body."""
+        piece, context = self.made(part, place), self.context
+        origin, turned = vector(context, part.position), _attitude_of(part, self.sequence, place, context)
+        if turned is not None:
+            turn = attitude.rotation_matrix(turned[0])
+            piece.inertia = multiply(multiply(turn, piece.inertia), transpose(turn))
+            piece.position = apply(turn, piece.position)
+            whole = attitude.product([float(plain(x)) for x in turned[0]], piece.drawing["quaternion"])
+            piece.drawing["quaternion"] = whole
+        piece.position = [x + p for x, p in zip(piece.position, origin, strict=True)]
+        return piece
+
+    def made(self, table: Body | Part, place: str) -> _Piece:
+        """A piece along its own axes, from its own origin."""
+        if table.file is not None:
+            return self._of_file(table, place)
+        if table.shape is None and isinstance(table, Part):
+            return self._of_tensor(table, place)
+        return self._of_shape(table, place)
+
+    def _mass(self, table: Body | Part, place: str) -> Any:
+        if table.mass is None:
+            raise refusal(f"{place}mass", "missing; this body needs a mass, a positive number")
+        return table.mass.at(self.context)
+
+    def _of_shape(self, table: Body | Part, place: str) -> _Piece:
+        context, name = self.context, str(table.shape)
+        shape = SHAPES[name]
+        _refuse_dimensions(table, tuple(shape.dimensions), f"that a {name} doesn't have", place)
+        dimensions = {}
+        for key, count in shape.dimensions.items():
+            values, where = _lengths(table, key), f"{place}{key}"
+            lengths = "a positive length" if count == 1 else f"{count} positive lengths"
+            ensure(values != [None], refusal(where, f"missing; a {name} needs it: {lengths}"))
+            ensure(len(values) == count, refusal(where, f"given {len(values)} lengths; a {name} has {count}"))
+            dimensions[key] = vector(context, values)
+        for small, large in [shape.at_most] if shape.at_most else []:
+            given, limit = (context.nstr(dimensions[key][0], 12) for key in (small, large))
+            what = f"given {given} m; at most {large} ({limit} m) is allowed"
+            ensure(dimensions[small][0] <= dimensions[large][0], refusal(f"{place}{small}", what))
+        mass = self._mass(table, place)
+        inertia = diagonal([mass * m for m in shape.moments(context, dimensions)])
+        plainly = {k: [float(plain(x)) for x in v] for k, v in dimensions.items()}
+        sizes = {k: (v if shape.dimensions[k] > 1 else v[0]) for k, v in plainly.items()}
+        origin = [context.zero] * 3
+        return _Piece(mass, origin, inertia, _drawn(name, sizes, origin))
+
+    def _of_tensor(self, part: Part, place: str) -> _Piece:
+        context, mass, center = (
+            self.context,
+            self._mass(part, place),
+            vector(self.context, part.center_of_mass),
+        )
+        if part.inertia_tensor is not None:
+            _check_symmetric(part.inertia_tensor, place)
+            inertia, key = [vector(context, row) for row in part.inertia_tensor], "inertia_tensor"
+        else:
+            inertia, key = diagonal(vector(context, part.principal_moments)), "principal_moments"
+        if part.about == "origin":
+            inertia = _moved(inertia, -mass, center)
+        return self._alike(mass, center, inertia, place + key)
+
+    def _alike(self, mass: Any, center: Vector, inertia: Matrix, where: str) -> _Piece:
+        """A piece that is drawn as the cuboid with its moments."""
+        moments, axes = eigen(self.context, inertia)
+        _check_moments(self.context, moments, where)
+        return _Piece(mass, center, inertia, _equivalent_cuboid(self.context, mass, center, moments, axes))
+
+    def _of_file(self, table: Body | Part, place: str) -> _Piece:
+        context, name = self.context, str(table.file)
+
+        def fault(what: str) -> ConfigError:
+            return refusal(f"{place}file", f'given "{name}", {what}')
+
+        what = (
+            "but this config was given as text, without files next to it; put the file's text into [tables.\""
+        )
+        ensure(name in self.texts, fault(f'{what}{name}"] text'))
+        if not is_mesh(name):
+            beside = [key for key in ("mass", "density", "unit") if getattr(table, key) is not None]
+            ensure(not beside, fault(f"which has its own mass and units; remove {' and '.join(beside)}"))
+            try:
+                found = Part.model_validate(link_inertia(self.texts[name], table.link, fault))
+            except ValidationError as error:
+                first = error.errors()[0]
+                raise fault(f"whose <inertial> has for {first['loc'][0]}: {first['msg']}") from None
+            return self.placed(found, f"{place}file ")
+        ensure(table.link is None, fault("which is a mesh without links; remove link"))
+        what = f"given {'both' if table.mass else 'neither'}; a mesh needs one of mass and density"
+        ensure((table.mass is None) != (table.density is None), refusal(f"{place}density", what))
+        read, unit = mesh_moments(self.texts[name]), self._unit(table, place)
+        volume = context.mpf(read["volume"]) * unit**3
+        density = (
+            table.density.at(context) if table.density is not None else self._mass(table, place) / volume
+        )
+        inertia = [[density * context.mpf(x) * unit**5 for x in row] for row in read["tensor"]]
+        center = [context.mpf(x) * unit for x in read["center"]]
+        return self._alike(density * volume, center, inertia, f"{place}file")
+
+    def _unit(self, table: Body | Part, place: str) -> Any:
+        """Metres of the unit of a mesh."""
+        try:
+            return parse_number(f"1 {table.unit or 'm'}", "m").at(self.context)
+        except ValueError as error:
+            raise refusal(f"{place}unit", str(error)) from None
+
+
+def field_of_mesh(table: Body, texts: Mapping[str, str]) -> GravityFieldTable | None:
+    """The field of degrees 3 and 4 of a body that is a mesh; None of others."""
+    if table.file is None or not is_mesh(table.file) or table.reference not in (None, "center_of_mass"):
+        return None
+    read = mesh_moments(texts[table.file])["gravity_field"]
+    if not (read["C"] or read["S"]):
+        return None
+    return GravityFieldTable.model_validate({**read, "radius": f"{read['radius']} {table.unit or 'm'}"})
 
 
 def _attitude_of(part: Part, sequence: str, place: str, context: Any) -> Any:
@@ -496,16 +650,9 @@ def _finish(
     ensure(
         largest != 0, refusal(source, "all moments are zero; a body that turns needs inertia about some axis")
     )
-    slack = largest * context.mpf(_ROUNDING_OF_INPUT)
     tiny = largest * context.mpf(2) ** (16 - context.prec)
     moments = [context.zero if abs(m) < tiny else m for m in moments]
-    given = f"principal moments {', '.join(context.nstr(m, 12) for m in moments)}: "
-    ensure(min(moments) >= 0, refusal(source, f"{given}a moment of inertia can't be negative"))
-    ensure(sorted(moments)[1] != 0, refusal(source, f"{given}at most one can be zero (a rod's)"))
-    small, middle, large = sorted(moments)
-    what = f"{given}the largest is more than the sum of the other two by "
-    what += f"{context.nstr(large - small - middle, 6)}, which no mass distribution allows (I1 + I2 >= I3)"
-    ensure(small + middle >= large - slack, refusal(source, what))
+    _check_moments(context, moments, source)
     drawing = drawing or [_equivalent_cuboid(context, mass, center, moments, axes)]
     described = source
     if table.preset is not None:  # with its reference, and what else stands in its place
@@ -513,6 +660,17 @@ def _finish(
         scaled = f"{named}, with the mass of the config" if table.mass is not None else named
         described = scaled if source == "preset" else f"{source} with {named}"
     return RigidBody(mass, center, inertia, moments, axes, described, drawing)
+
+
+def _check_moments(context: Any, moments: Vector, where: str) -> None:
+    """Refuse principal moments that no mass has."""
+    given = f"principal moments {', '.join(context.nstr(m, 12) for m in moments)}: "
+    small, middle, large = sorted(moments)
+    ensure(small >= 0, refusal(where, f"{given}a moment of inertia can't be negative"))
+    ensure(middle != 0 or large == 0, refusal(where, f"{given}at most one can be zero (a rod's)"))
+    what = f"{given}the largest is more than the sum of the other two by "
+    what += f"{context.nstr(large - small - middle, 6)}, which no mass distribution allows (I1 + I2 >= I3)"
+    ensure(small + middle >= large - large * context.mpf(_ROUNDING_OF_INPUT), refusal(where, what))
 
 
 def _equivalent_cuboid(
