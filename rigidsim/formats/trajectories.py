@@ -79,6 +79,15 @@ class Trajectory:
         """A row as the file counts it."""
         return f"{self.counted} {int(index if self.lines is None else self.lines[index])}"
 
+    def at(self, rows: np.ndarray | slice) -> Trajectory:
+        """These rows alone, counted as in the file."""
+        lines = self.lines
+        if lines is None:
+            lines = np.arange(len(next(iter(self.columns.values()))))
+        columns = {name: values[rows] for name, values in self.columns.items()}
+        epochs = tuple(self.epochs[n] for n in np.arange(len(self.epochs))[rows]) if self.epochs else ()
+        return replace(self, columns=columns, lines=lines[rows], epochs=epochs)
+
     @property
     def names(self) -> list[str]:
         """Names of all columns, also of those that hold no numbers."""

@@ -16,6 +16,7 @@ from pydantic import ValidationError
 
 from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.scene import validation_messages as messages
+from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.bodies.files import is_mesh, moments_of
 from rigidsim.scene.bodies.gravity_field import asked_degree, cut
 from rigidsim.scene.exact import ExactNumber
@@ -140,7 +141,8 @@ class Experiment:
         Args:
             record: the variables recorded, without a published orientation; by default what the config asks
                 for.
-            times: exact times of the samples, s, ascending; by default as the config says.
+            times: exact times of the samples, s, from start on in either direction; by default as the config
+                says.
             estimate: whether the errors are estimated.
             tables: other tables of the config.
         """
@@ -160,6 +162,16 @@ class Experiment:
             others = dict.fromkeys(("end", "samples", "every"))
             tables["time"] = self.config.time.model_copy(update=listed | others)
         return exchanged(self, config=self.config.model_copy(update=tables))
+
+    def ways(self, times: Iterable[float]) -> tuple[list[Fraction], list[Fraction]]:
+        """Ascending times (s) as the exact ones of two runs from start, backwards and forwards. The double
+        nearest to start is start.
+        """
+        start = self.config.time.start.fraction(context_for(self.config.integrator.precision))
+        exact = [start if time == float(start) else Fraction(time) for time in times]
+        early = sum(time < start for time in exact)
+        split = len(exact) if early and exact[-1] == start else early  # no run for the start alone
+        return exact[:split][::-1], exact[split:]
 
     def __repr__(self) -> str:
         loads = ", ".join(load.kind for load in self.config.loads) or "no load"  # type: ignore[attr-defined]

@@ -111,6 +111,12 @@ class Scene(Setting):
         return abs(self.end - self.start)
 
     @property
+    def reach(self) -> tuple[float, float]:
+        """Times, s, as far before and after the start as the run ends."""
+        start, far = float(self.start), float(max(self.duration, abs(self.samples.last - self.start)))
+        return start - far, start + far
+
+    @property
     def torque_arm(self) -> Vector | None:
         """Mass times centre of mass (kg m, body axes) on which gravity acts; None without a torque."""
         if self.gravity is None or self.free_flight or self.body.mass is None:

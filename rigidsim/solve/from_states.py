@@ -33,11 +33,14 @@ class NotFromStates(Exception):
 class AnyStart:
     """A scene's equations in rates and quaternion, which may begin at any attitude and rates."""
 
-    def __init__(self, scene: Scene, precision: Precision, *, compact: bool = False) -> None:
+    def __init__(
+        self, scene: Scene, precision: Precision, *, compact: bool = False, forwards: bool = False
+    ) -> None:
         self.precision = precision
-        self._system = System(
-            replace(plan_model(scene.as_motion()), formulation=Quaternion()), precision.number
-        )
+        plan = replace(plan_model(scene.as_motion()), formulation=Quaternion())
+        if forwards:  # whichever way the scene runs
+            plan = replace(plan, scaling=replace(plan.scaling, direction=1))
+        self._system = System(plan, precision.number)
         self._options = dict(precision.options, compact_mode=compact or self._system.wide)
         names = self._system.states
         self._places = [names.index(name) for name in (*BODY.quaternion, *BODY.rates)]
@@ -83,7 +86,7 @@ class FromStates(AnyStart):
         if scene.config.model.level != "full":
             what = f"the config's model is {scene.config.model.level}, an average without an attitude"
             raise NotFromStates(what)
-        super().__init__(scene, precision_of("double"))
+        super().__init__(scene, precision_of("double"), forwards=True)
         if not self.plain:
             raise NotFromStates("its equations change along the motion (tables, kernels or switches)")
         if self._system.mechanics.rate_correction is not None:
@@ -99,14 +102,17 @@ class FromStates(AnyStart):
     def motion(self, times: np.ndarray) -> np.ndarray:
         """The scene's own states (rows, states), internal units, at ascending times (s)."""
         engine, grid = self._engine, self._internal(times)
-        engine.time = self._start
-        engine.state[:] = self.precision.array(self._system.initial)
-        begun = grid if grid[0] == self._start else np.append(self._start, grid)
-        result = engine.propagate_grid(begun, max_steps=10**9)
-        states = np.asarray(result[5] if len(result) > 5 else result[-1])
-        if result[0] != hy.taylor_outcome.time_limit or len(states) != len(begun):
-            raise NotFromStates("its motion ends before the trajectory does")
-        return states[len(begun) - len(grid) :]
+        initial = self.precision.array(self._system.initial)
+        found, early = np.empty((len(grid), len(initial))), int(np.searchsorted(grid, self._start))
+        for rows in (np.arange(early)[::-1], np.arange(early, len(grid))):  # backwards, then on
+            engine.time, engine.state[:] = self._start, initial
+            begun = np.concatenate([[self._start], grid[rows][grid[rows] != self._start]])
+            result = engine.propagate_grid(begun, max_steps=10**9)
+            states = np.asarray(result[5] if len(result) > 5 else result[-1])
+            if result[0] != hy.taylor_outcome.time_limit or len(states) != len(begun):
+                raise NotFromStates("its motion ends before the trajectory does")
+            found[rows] = states[len(begun) - len(rows) :]
+        return found
 
     def states(
         self, own: np.ndarray, quaternions: np.ndarray, rates: np.ndarray, flight: np.ndarray | None = None

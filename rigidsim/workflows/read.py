@@ -16,7 +16,7 @@ from rigidsim.scene.config import Experiment, Overrides, parse
 from rigidsim.scene.config import load as load_file
 from rigidsim.scene.kernels.reading import EMBEDDED, FOLDERS
 from rigidsim.scene.registry import OBSERVABLES
-from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.scene.scene import build_scene
 from rigidsim.scene.schema import config_model
 from rigidsim.scene.validation_messages import nearest, shown
 from rigidsim.session.dataset import kernel_attributes
@@ -99,18 +99,6 @@ def with_recorded_variables_of(experiment: Experiment, saved: Path) -> Experimen
     names = [name for name in recorded.split() if name in known]
     config = experiment.config.model_copy(update={"output": output.model_copy(update={"record": names})})
     return replace(experiment, config=config)
-
-
-def refuse_backwards(scene: Scene, source: str) -> None:
-    """Refuse a run that goes backwards where rows of data follow its start.
-
-    Raises:
-        ConfigError.
-    """
-    if scene.samples.direction < 0:
-        what = f"given {float(scene.end):g} s, before start, and rows are taken after it; give start at or "
-        what += "before the first row, and [initial] for that time"
-        raise ConfigError(Problem("[time] end", what), source)
 
 
 def refuse_other_kernel(experiment: Experiment, saved: Path) -> None:

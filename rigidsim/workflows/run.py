@@ -11,7 +11,7 @@ from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from rigidsim.model.load import Load
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.choices import AUTO, FULL
 from rigidsim.scene.config import Experiment, Overrides, parse
+from rigidsim.scene.parts_of_values import in_time_order
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.scene.toml_text import assignments, assignments_of
 from rigidsim.session.dataset import refuse_taken_names
@@ -40,7 +41,7 @@ from rigidsim.store.provenance import SYSTEM, changed, platform_of, read_attribu
 from rigidsim.store.run import MemoryRun, Run, SavedRun, open_run
 from rigidsim.store.seal import check_seal
 from rigidsim.store.segments import Chain, read_chain
-from rigidsim.store.summary import ENGINE, Summary
+from rigidsim.store.summary import ENGINE, Brief, Summary
 from rigidsim.workflows.read import (
     Given,
     as_experiment,
@@ -49,6 +50,9 @@ from rigidsim.workflows.read import (
     text_difference,
     with_recorded_variables_of,
 )
+
+if TYPE_CHECKING:
+    import xarray
 
 AnyRun = TypeVar("AnyRun", bound=Run)
 
@@ -228,6 +232,66 @@ def certified(
     cost = summary.cost.having(**session.watch.as_dict(summary.cost.seconds[ENGINE]))
     summary = summary.warned(cautions).having(accuracy=summary.accuracy.having(**known), cost=cost)
     return result.concluded(summary), doubt is None
+
+
+# --- at given times, and once more --------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """A motion at given times on both sides of its start.
+
+    Attributes:
+        dataset: in memory, its rows ascending in time; of two runs without their events.
+        reached: which of the times it has.
+        outcome: of the run that ended early, else of the last one.
+        attitude_error: announced, rad, the larger one of both ways; None if unknown.
+    """
+
+    dataset: "xarray.Dataset"
+    reached: slice
+    outcome: Brief
+    attitude_error: float | None
+
+
+def sampled(
+    experiment: Experiment,
+    times: Sequence[float] | np.ndarray,
+    record: Sequence[str] | None = None,
+    **quiet: Any,
+) -> Sampled:
+    """An experiment's motion at exactly these ascending times, s, by a run backwards and one forwards.
+
+    Args:
+        record, quiet: as for ``Experiment.quiet``.
+
+    Raises:
+        ConfigError: it can't be run.
+    """
+    ways = experiment.ways(times)
+    made = {
+        n: run(experiment.quiet(record, way, **quiet), out=None, progress=False)
+        for n, way in enumerate(ways)
+        if way
+    }
+    parts = {n: in_time_order(one.dataset) for n, one in made.items()}
+    missing = [len(way) - parts[n].sizes["time"] if way else 0 for n, way in enumerate(ways)]
+    dataset = parts[max(parts)]
+    if len(parts) > 1:
+        import xarray
+
+        events = [event.name for event in experiment.config.events]
+        both = [part.drop_dims(events, errors="ignore") for part in (dataset, parts[0])]
+        once = dict.fromkeys(("compat", "combine_attrs"), "override")
+        joined = xarray.concat(both, "time", data_vars="minimal", coords="minimal", **once)
+        dataset = joined.sortby("time")
+    errors = [one.attitude_error for one in made.values()]
+    return Sampled(
+        dataset,
+        slice(missing[0], len(times) - missing[1]),
+        made[0 if missing[0] else max(made)].outcome,
+        None if None in errors else max(errors),
+    )
 
 
 # --- once more ----------------------------------------------------------------------------------------------

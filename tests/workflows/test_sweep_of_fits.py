@@ -111,7 +111,7 @@ def test_fits_that_fail_are_told_with_their_reason(here: Path) -> None:
     text = (SPUN + free + NIGHTS).replace('"nights"', '"failing"').replace(', "seen/2.csv"', "")
     found = rigidsim.sweep(rigidsim.parse(text), out=here / "runs")
     with found.dataset as dataset:
-        assert "no row lies within the run" in str(dataset["failed_reason"].values[0])
+        assert "no row lies as near to the run's start as its end" in str(dataset["failed_reason"].values[0])
         assert np.isnan(dataset["value"].values[1]).all()
         assert np.isfinite(dataset["value"].values[0]).all()
         assert np.isnan(dataset["sigma"].values[0, 3:]).all()

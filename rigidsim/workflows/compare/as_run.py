@@ -49,8 +49,8 @@ def trajectory_given(table: Any, scene: Scene, kernels: Sequence[str | Path]) ->
     if path.suffix.lower() == ck_reading.SUFFIX or kernels:
         if scene.epoch is None:
             raise RigidsimError(f"{path}: a CK holds dates; give the date of time 0 as [time] epoch")
-        span = float(scene.start), float(scene.samples.last)
-        return ck_reading.read_ck(path, [Path(one) for one in kernels], scene.epoch.since_j2000(), *span)
+        files, zero = [Path(one) for one in kernels], scene.epoch.since_j2000()
+        return ck_reading.read_ck(path, files, zero, *scene.reach)
     if path.is_dir() and path.suffix != ".zarr":
         return trajectory_given(open_run(path), scene, kernels)
     return read_trajectory(path).in_axes(scene.axes)

@@ -15,7 +15,6 @@ from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.store.outputs import refuse_loss, writing
-from rigidsim.store.run import Run
 from rigidsim.store.summary import SummaryPart
 from rigidsim.workflows.compare.as_run import dataset_of_rows, files_of, trajectory_given
 from rigidsim.workflows.compare.conventions import (
@@ -28,8 +27,8 @@ from rigidsim.workflows.compare.conventions import (
 )
 from rigidsim.workflows.compare.defects import rms
 from rigidsim.workflows.compare.evidence import Evidence, judged
-from rigidsim.workflows.read import Given, as_experiment, refuse_backwards
-from rigidsim.workflows.run import run
+from rigidsim.workflows.read import Given, as_experiment
+from rigidsim.workflows.run import Sampled, sampled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -215,15 +214,15 @@ def compare(
     given = attitudes_of(trajectory_given(table, scene, kernels), scene.epoch)
     if not 0 < within < np.pi:
         raise RigidsimError(f"within: given {within:g}; an angle above 0 and below pi, in rad, is allowed")
-    _refuse_far(given, float(scene.start), float(scene.samples.last))
+    _refuse_far(given, scene)
     notes = list(given.notes)
     if given.time_unit is None:
         notes.append("times were taken to be in s; name another unit in the column's name: t [day]")
-    own, uncertainty = _own_motion(quiet, given.times, notes)
-    given = given.at(slice(own.sizes["time"]))
+    made = _own_motion(quiet, given.times, notes)
+    given, own = given.at(made.reached), made.dataset
     motion = own["quaternion"].values, own["angular_velocity"].values
-    found, more = find_convention(given, convention or {}, motion)
-    seen = Evidence(given, found, own, uncertainty, within, notes + more, scene)
+    found, more = find_convention(given, convention or {}, motion, float(scene.start))
+    seen = Evidence(given, found, own, made.attitude_error or 0.0, within, notes + more, scene)
     result = _result(seen, asked.config.name, {name: str(path) for name, path in paths.items()})
     if out is not None:
         result.save(out)
@@ -246,20 +245,20 @@ def _refuse_names(paths: Mapping[str, Path]) -> None:
             )
 
 
-def _refuse_far(given: Attitudes, begin: float, end: float) -> None:
-    """Refuse times before the experiment (s), or far from it, such as Unix seconds."""
+def _refuse_far(given: Attitudes, scene: Scene) -> None:
+    """Refuse times far from the experiment, such as Unix seconds."""
     first, last = float(given.times[0]), float(given.times[-1])
-    early = first < begin - 1e-9 * abs(begin)
-    if not early and first - end <= _FAR_AWAY * max(last - first, end - begin):
+    begin, (least, most) = float(scene.start), scene.reach
+    if max(first - most, least - last) <= _FAR_AWAY * max(last - first, most - begin):
         return
-    unit = given.time_unit or "s"
+    unit, end = given.time_unit or "s", float(scene.samples.last)
     second = size_of(unit, "s")
     raise RigidsimError(
-        f"{given.trajectory.source}: its times, {first / second:.15g} to {last / second:.15g} {unit}, begin "
-        + ("before the experiment's start" if early else "far behind the experiment")
-        + f" ({begin:.6g} to {end:.6g} s), as if counted from another zero (Unix seconds?); subtract "
-        f"{(first - begin) / second:.15g} from each time, if its first row is the experiment's start; or "
-        "write dates, and give [time] epoch; or move [time] start"
+        f"{given.trajectory.source}: its times, {first / second:.15g} to {last / second:.15g} {unit}, lie "
+        f"far {'behind' if first > begin else 'before'} the experiment ({begin:.6g} to {end:.6g} s), as if "
+        f"counted from another zero (Unix seconds?); subtract {(first - begin) / second:.15g} from each "
+        "time, if its first row is the experiment's start; or write dates, and give [time] epoch; or move "
+        "[time] start"
     )
 
 
@@ -275,31 +274,27 @@ def _plain(experiment: Experiment) -> tuple[Experiment, Scene]:
     flies = config.initial.position is not None or config.initial.velocity is not None
     names = ["quaternion", "angular_velocity", *(["position"] if flies else [])]
     quiet = experiment.quiet(names, estimate=config.output.estimate)
-    scene = build_scene(quiet)
-    refuse_backwards(scene, experiment.source)
-    return quiet, scene
+    return quiet, build_scene(quiet)
 
 
-def _sampled(experiment: Experiment, times: np.ndarray) -> Run:
-    """Run the experiment in memory, sampled at exactly these doubles (s, ascending)."""
-    sampled = experiment.quiet(times=times.tolist(), estimate=experiment.config.output.estimate)
-    return run(sampled, out=None, progress=False)
+def _sampled(experiment: Experiment, times: np.ndarray) -> Sampled:
+    """The experiment at exactly these doubles (s, ascending)."""
+    return sampled(experiment, times.tolist(), estimate=experiment.config.output.estimate)
 
 
-def _own_motion(experiment: Experiment, times: np.ndarray, notes: list[str]) -> tuple[xarray.Dataset, float]:
-    """The experiment at these times, up to its end if that is earlier; and the announced error of its
-    attitude, rad (0 if unknown).
+def _own_motion(experiment: Experiment, times: np.ndarray, notes: list[str]) -> Sampled:
+    """The experiment at these times, as far as it gets.
 
     Raises:
         RigidsimError: the motion ends before the third of them.
     """
     made = _sampled(experiment, times)
-    found, message = made.dataset, made.outcome.message
-    if found.sizes["time"] < LEAST_ROWS:
+    count, message = made.dataset.sizes["time"], made.outcome.message
+    if count < LEAST_ROWS:
         raise RigidsimError(f"the experiment's motion {message}, before the trajectory begins")
-    if found.sizes["time"] < len(times):
-        notes.append(f"the experiment's motion {message}; later rows aren't compared")
-    return found, made.attitude_error or 0.0
+    if count < len(times):
+        notes.append(f"the experiment's motion {message}; rows beyond that aren't compared")
+    return made
 
 
 # --- the result ---------------------------------------------------------------------------------------------

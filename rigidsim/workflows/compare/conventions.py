@@ -98,8 +98,7 @@ class Attitudes:
         """These rows alone."""
         names = ("times", "attitude", "rates", "positions", "velocities")
         some: dict[str, Any] = {name: x[rows] for name in names if (x := getattr(self, name)) is not None}
-        columns = {name: values[rows] for name, values in self.trajectory.columns.items()}
-        return replace(self, trajectory=replace(self.trajectory, columns=columns), **some)
+        return replace(self, trajectory=self.trajectory.at(rows), **some)
 
 
 def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
@@ -120,6 +119,7 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
         raise RigidsimError(
             f"{found.source}: {rows} rows; at least {LEAST_ROWS} are needed: sample more often{without}"
         )
+    found = found.at(slice(None))  # with numbers of its rows
     plain = {_plain(name): name for name in found.columns}
     columns: dict[str, list[str]] = {}
     for kind, forms in _FORMS.items():
@@ -156,6 +156,10 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
         columns["time"] = [name]
         time_unit = _unit(found, [name]) or ("s" if name.lower() == "seconds" else None)
         times = found.column(name)
+    if (np.diff(times) < 0).all():  # of a tool that went backwards
+        back = slice(None, None, -1)
+        found, times = found.at(back), times[back]
+        taken = {name: values[back] for name, values in taken.items()}
     notes += _refuse_rows(found, times, kind, taken[kind])
     second = _seconds_in(time_unit or "s", found.source)
     resolution = found.resolution or (
@@ -350,11 +354,12 @@ class Convention:
         return ", ".join(words)
 
 
-def rows_compared(count: int) -> np.ndarray:
-    """Rows that conventions are found by: all over the trajectory, more of them near its beginning."""
-    even = np.linspace(0, count - 1, 150)
-    early = np.geomspace(1, count, 100) - 1
-    return np.unique(np.concatenate([even, early]).astype(int))
+def rows_compared(count: int, begin: int = 0) -> np.ndarray:
+    """Rows that conventions are found by: all over the trajectory, more of them near where it begins."""
+    even = np.linspace(0, count - 1, 150).astype(int)
+    away = (np.geomspace(1, count, 100) - 1).astype(int)
+    found = np.unique(np.concatenate([even, begin + away, begin - away]))
+    return np.asarray(found[(found >= 0) & (found < count)])
 
 
 def attitude_conventions(given: Attitudes) -> list[Convention]:
@@ -384,7 +389,10 @@ def rate_conventions(given: Attitudes) -> list[dict[str, Any]]:
 
 
 def find_convention(
-    given: Attitudes, asked: Mapping[str, str], motion: tuple[np.ndarray, np.ndarray] | None = None
+    given: Attitudes,
+    asked: Mapping[str, str],
+    motion: tuple[np.ndarray, np.ndarray] | None = None,
+    begin: float = -np.inf,
 ) -> tuple[Convention, list[str]]:
     """The convention of a trajectory, and what a user should know of it.
 
@@ -392,23 +400,25 @@ def find_convention(
         asked: values that attributes of the convention have to have.
         motion: attitudes (rows, 4) and rates (rows, 3) of the experiment. Without it, the attitudes have to
             turn at the rates in the file.
+        begin: time, s, at which both start.
 
     Raises:
         RigidsimError: no convention has the values asked for; or, without an experiment, the attitudes turn
             at the rates in none.
     """
-    rows = rows_compared(len(given.times) - 1)
+    first = int(np.argmin(np.abs(given.times[:-1] - max(begin, given.times[0]))))
+    rows = rows_compared(len(given.times) - 1, first)
     here, there, steps = given.at(rows), given.at(rows + 1), np.diff(given.times)[rows, None]
     plain, rated = attitude_conventions(given), [{}] if given.rates is None else rate_conventions(given)
     _refuse_others(given, asked, plain, rated)
     plain = [one for one in plain if _has(one, asked, "order", "direction", "sequence", "about", "unit")]
     tried = [(0.0, one) for one in plain]
     if motion is not None:
-        own = motion[0][rows]
+        own, at = motion[0][rows], int(np.searchsorted(rows, first))
         tried = [
             (_mean(angles_between(one.quaternions(here), own)) + _OFFSET_GAIN * (one.offset != "none"), one)
             for start in plain
-            for one in start.turned_to(start.quaternions(here)[0], own[0])
+            for one in start.turned_to(start.quaternions(here)[at], own[at])
             if _has(one, asked, "offset")
         ] or tried
     nearest = min(score for score, _ in tried)

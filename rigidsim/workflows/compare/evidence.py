@@ -67,6 +67,7 @@ class Evidence:
     Attributes:
         times: (rows,), s; over the ``span``, s. quaternions: (rows, 4), w x y z, body to space axes.
         rates, own_rates: of the file and of the experiment, (rows, 3), rad/s, body axes; None if unknown.
+        begin: the row nearest to the experiment's start.
         errors: angles (rows,), rad, between the attitudes. rate_errors, position_errors: (rows,), SI; None
             where one of both has none.
         rate: of the motion, rad/s: the experiment's, or that at which the file's attitudes turn, if larger.
@@ -94,6 +95,7 @@ class Evidence:
         self.explained: WindowsOfAttitudes | None = None
         self.times, self.quaternions = given.times, convention.quaternions(given)
         self.span = float(self.times[-1] - self.times[0])
+        self.begin = int(np.argmin(np.abs(self.times - float(scene.start))))
         self.own_rates = own["angular_velocity"].values
         self.rates = None if given.rates is None else convention.rates(given.rates, self.quaternions)
         first, *more = parts_of(own, "quaternion", np.arange(len(self.times)))
@@ -116,7 +118,7 @@ class Evidence:
         self.resolution = given.resolution[0] * (size_of(unit, "rad") if unit else 2.0)
         self.rate_noise = given.resolution[1] * size_of(turning, "rad/s") if turning else 0.0
         self._even = even = np.linspace(self.times[0], self.times[-1], len(self.times))
-        exact, apart = _EXACT * abs(float(self.times[-1])), float(np.abs(self.times - even).max())
+        exact, apart = _EXACT * float(np.abs(self.times).max()), float(np.abs(self.times - even).max())
         self._exact, most = apart <= exact, given.resolution[2]
         rounded = not self._exact and apart <= 2 * most  # times that would be even but for their digits
         self.attitude_noise = self.resolution + (self.rate * most / np.sqrt(3) if rounded else 0.0)
@@ -213,8 +215,8 @@ class Evidence:
 
     @property
     def rate_gap(self) -> float:
-        """Difference of the first rates, rad/s."""
-        return 0.0 if self.rate_errors is None else float(self.rate_errors[0])
+        """Difference of the rates where they begin, rad/s."""
+        return 0.0 if self.rate_errors is None else float(self.rate_errors[self.begin])
 
     @cached_property
     def windows(self) -> defects.WindowDefects | None:
@@ -312,7 +314,7 @@ def _contradiction(seen: Evidence, windows: defects.WindowDefects) -> Verdict | 
 
 def _elsewhere(seen: Evidence, gap: float, attitude: float, rates: float, length: float) -> Verdict | None:
     """The verdict on another start, which outweighs defects (rad, rad/s) over windows of a length (s)."""
-    angle, floor = float(seen.errors[0]), seen.floor[0]
+    angle, floor = float(seen.errors[seen.begin]), seen.floor[0]
     collected = seen.span / length * (attitude + rates * seen.span)
     noise = seen.rate_noise + seen.attitude_noise / length
     if angle <= floor and gap <= max(_ABOVE * noise, floor * seen.rate):
@@ -325,9 +327,10 @@ def _elsewhere(seen: Evidence, gap: float, attitude: float, rates: float, length
 
 def _elsewhere_alone(seen: Evidence, windows: WindowsOfAttitudes) -> Verdict | None:
     """The verdict on attitudes alone whose first rates differ, where their defects are nothing."""
-    rate_gap = float(np.linalg.norm(windows.rates[0] - seen.own_rates[windows.rows[0, 0]]))
+    first = int(np.argmin(np.abs(windows.rows[:, 0] - seen.begin)))
+    rate_gap = float(np.linalg.norm(windows.rates[first] - seen.own_rates[windows.rows[first, 0]]))
     size, length = windows.size, windows.length
-    if rate_gap * length <= _SURE * size and seen.errors[0] <= seen.floor[0]:
+    if rate_gap * length <= _SURE * size and seen.errors[seen.begin] <= seen.floor[0]:
         return None
     return _elsewhere(seen, rate_gap, size, size / length, length)
 

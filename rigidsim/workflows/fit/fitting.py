@@ -44,7 +44,7 @@ from rigidsim.workflows.fit.observations import (
     read_readings,
 )
 from rigidsim.workflows.read import Given, as_experiment, load
-from rigidsim.workflows.run import run
+from rigidsim.workflows.run import sampled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -499,7 +499,7 @@ def fitted_run(experiment: Experiment, fit: xarray.Dataset, source: str = "memor
     more = asked is not None and QUATERNION not in asked and _COVARIANCE in fit
     record = [*asked, QUATERNION] if more and asked else None
     # without its own error, which would mislead beside the fit's
-    made = run(experiment.quiet(record, fit["time"].values.tolist()), out=None, progress=False)
+    made = sampled(experiment, fit["time"].values.tolist(), record)
     found = made.dataset
     if found.sizes["time"] != fit.sizes["time"]:
         raise RunFolderError(f"{source}: the fitted motion {made.outcome.message}, before the fit's own end")
@@ -649,14 +649,17 @@ def fit_to(experiment: Experiment, places: list[DataFiles], *, report: Report | 
                     "estimated; add data or priors, or estimate fewer"
                 )
             predictor: Predictor
+            every = np.concatenate([one.times for one in readings])
             try:
-                predictor = ByTangents(keys, quiet, quantities)
+                predictor = ByTangents(keys, quiet, quantities, every)
             except ConfigError as error:
                 predictor = ByDifferences(keys, quiet, quantities)
                 predictor.how += f" ({error.problems[0].what})"
             weighing = Weighing(keys, readings, predictor)
             ended, costs, more = search(weighing, table.starts, report or (lambda _: None))
-            times = np.linspace(float(keys.scene.start), float(keys.scene.samples.last), _ALONG_ROWS)
+            run = keys.scene.samples  # and the observations on the other side of its start
+            ends = [float(run.start), float(run.last), every.min(), every.max()]
+            times = np.linspace(min(ends), max(ends), _ALONG_ROWS)
             along = weighing.along(ended.values, times)
     except ConfigError as error:
         raise error.at(experiment.source) from None

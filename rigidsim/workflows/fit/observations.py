@@ -41,8 +41,7 @@ from rigidsim.scene.validation_messages import nearest, shown
 from rigidsim.scene.varied_keys import ATTITUDE, VariedKey, varied_keys
 from rigidsim.solve.problem import prepare
 from rigidsim.store.variables import LABELS
-from rigidsim.workflows.read import refuse_backwards
-from rigidsim.workflows.run import run
+from rigidsim.workflows.run import sampled
 from rigidsim.workflows.sensitivity import Tangents
 
 _PREFIX = "fit_expression_"
@@ -393,19 +392,20 @@ class _Reader:
         return np.full((count, width), value)
 
     def _within(self, times: np.ndarray, notes: list[str]) -> np.ndarray:
-        """Rows in the span of the run."""
-        begin, end = float(self.scene.start), float(max(self.scene.end, self.scene.samples.last))
+        """Rows no farther from the run's start than its end, on both sides."""
+        begin, end = self.scene.reach
         inside = (times >= begin) & (times <= end)
         span = f"{begin:.6g} to {end:.6g} s"
         if not inside.any():
             raise RigidsimError(
-                f"{self.found.source}: no row lies within the run ({span}): its rows are at "
-                f"{times.min():.6g} to {times.max():.6g} s; change [time], or check epoch and scale"
+                f"{self.found.source}: no row lies as near to the run's start as its end ({span}): its rows "
+                f"are at {times.min():.6g} to {times.max():.6g} s; change [time], or check epoch and scale"
             )
         if not inside.all():
+            first = self.found.row(int(np.argmin(inside)))
             notes.append(
-                f"{self.table.file}: {int((~inside).sum())} of {len(times)} rows lie outside the run "
-                f"({span}) and were left out, first {self.found.row(int(np.argmin(inside)))}"
+                f"{self.table.file}: {int((~inside).sum())} of {len(times)} rows lie farther from the run's "
+                f"start than its end ({span}) and were left out, first {first}"
             )
         return np.flatnonzero(inside)
 
@@ -453,7 +453,6 @@ class FitKeys:
         assert table is not None
         self._experiment = experiment
         self.scene = build_scene(experiment)
-        refuse_backwards(self.scene, experiment.source)
         self.estimated = self._all("parameters", table.parameters, "prior", table.prior)
         self.considered = self._all("consider", list(table.consider), "consider", table.consider)
         self._turned = any(one.key.startswith(ATTITUDE) for one in self.all)
@@ -564,7 +563,7 @@ _FIRST = 1e-4  # first steps, relative to the size of each number
 
 
 class NotPredicted(RigidsimError):
-    """The motion at these values ends before the last observation, or has no finite values there."""
+    """The motion at these values ends before an observation, or has no finite values there."""
 
 
 @dataclass
@@ -624,15 +623,12 @@ class ByDifferences:
         """Predictions alone."""
         try:
             changed = self._keys.experiment(values, self._quiet)
-            made = run(
-                changed.quiet(self._quiet.config.output.record, times.tolist(), events=[], fit=None),
-                out=None, progress=False,
-            )  # fmt: skip
+            made = sampled(changed, times, self._quiet.config.output.record, events=[], fit=None)
         except ConfigError as error:
             raise NotPredicted(f"the experiment can't be run at these values: {error}") from None
         dataset = made.dataset
         if dataset.sizes["time"] != len(times):
-            raise NotPredicted(f"the motion {made.outcome.message} before the last observation")
+            raise NotPredicted(f"the motion {made.outcome.message} before an observation")
         found = {}
         for name in self._variables:
             value = dataset[name].values
@@ -685,7 +681,10 @@ class ByTangents:
 
     how = "variational equations"
 
-    def __init__(self, keys: FitKeys, quiet: Experiment, quantities: Sequence[Observed]) -> None:
+    def __init__(
+        self, keys: FitKeys, quiet: Experiment, quantities: Sequence[Observed], times: np.ndarray
+    ) -> None:
+        """Compile; ``times``: s, of all observations."""
         self._names = list(dict.fromkeys(one.variable for one in quantities))
         self._keys = [one.key for one in keys.all]
         self._sizes = np.array([one.size for one in keys.all])
@@ -695,7 +694,7 @@ class ByTangents:
             what = "its equations are so many that to differentiate them takes longer than the runs"
             raise ConfigError(Problem("[fit] parameters", what))
         self._source = Tangents(
-            stepping, self._keys, record=self._names, quickly=True, where="[fit] parameters"
+            stepping, self._keys, record=self._names, quickly=True, where="[fit] parameters", times=times
         )
 
     def at(self, values: Sequence[float], times: np.ndarray, names: Sequence[str] = ()) -> Prediction:
