@@ -282,15 +282,16 @@ def sampled(
 
         events = [event.name for event in experiment.config.events]
         both = [part.drop_dims(events, errors="ignore") for part in (dataset, parts[0])]
-        once = dict.fromkeys(("compat", "combine_attrs"), "override")
-        joined = xarray.concat(both, "time", data_vars="minimal", coords="minimal", **once)
+        joined = xarray.concat(
+            both, "time", data_vars="minimal", coords="minimal", compat="override", combine_attrs="override"
+        )
         dataset = joined.sortby("time")
-    errors = [one.attitude_error for one in made.values()]
+    errors = [error for one in made.values() if (error := one.attitude_error) is not None]
     return Sampled(
         dataset,
         slice(missing[0], len(times) - missing[1]),
         made[0 if missing[0] else max(made)].outcome,
-        None if None in errors else max(errors),
+        max(errors) if len(errors) == len(made) else None,
     )
 
 

@@ -228,7 +228,10 @@ def at(row: int, value: float, values: np.ndarray) -> np.ndarray:
 BROKEN = {
     "not finite": (lambda t, q, w: (t, at(7, np.nan, q), w), "line 9: qw is no finite"),
     "twice": (lambda t, q, w: (np.where(t == t[5], t[4], t), q, w), "line 7 has the time of the row before"),
-    "unsorted": (lambda t, q, w: (np.roll(t, 1), q, w), "line 3 is earlier than the row before .*sort the rows"),
+    "unsorted": (
+        lambda t, q, w: (np.roll(t, 1), q, w),
+        "line 3 is earlier than the row before .*sort the rows",
+    ),
     "none": (lambda t, q, w: (t[:0], q[:0], w[:0]), "no rows; a line of names"),
     "no rotation": (lambda t, q, w: (t, at(3, 2.0, q), w), "line 5: a quaternion of norm 2"),
     "far before": (lambda t, q, w: (t - 5e4, q, w), "far before the experiment"),
