@@ -123,17 +123,61 @@ def obliquity(axes: Any) -> None:
     arc(axes, normal, pole, "#6b4fa0", "ε", 0.6)
 
 
+def local(axes: Any, title: str, names: str, columns: np.ndarray, *, pole: bool = False) -> None:
+    """A body on its orbit, with the axes of a local frame there; the normal or the pole in grey."""
+    empty(axes, title)
+    axes.set(xlim=(-0.7, 0.7), ylim=(-0.55, 0.85), zlim=(-0.75, 0.65))
+    here, tilt = math.radians(80), math.radians(-25)
+    turn = np.linspace(0, 2 * math.pi, 160)[:, None]
+    across = np.array([0, math.cos(tilt), math.sin(tilt)])
+    orbit = 0.6 * (np.cos(turn) * np.eye(3)[0] + np.sin(turn) * across)
+    place = 0.6 * (math.cos(here) * np.eye(3)[0] + math.sin(here) * across)
+    axes.plot(*orbit.T, color=_GREY, lw=1.2)
+    axes.scatter(0, 0, 0, s=260, color="#9cc3e6")
+    axes.scatter(*place, s=22, color="#1b2733")
+    arrow(axes, np.eye(3)[2] * 0.55, _GREY, "Z", pale=True) if pole else None
+    up = place / np.linalg.norm(place)
+    normal = np.cross(np.eye(3)[0], across)
+    east = np.cross(np.eye(3)[2], up)
+    east /= np.linalg.norm(east)
+    first = (np.cross(up, east), east) if pole else (np.cross(normal, up), -normal)
+    frame = np.array([*first, -up]).T @ columns
+    for direction, name, colour in zip(frame.T, names.split(), _COLOURS, strict=True):
+        axes.quiver(*place, *(0.5 * direction), color=colour, lw=2.2, arrow_length_ratio=0.15)
+        axes.text(*(place + 0.62 * direction), name, color=colour, fontsize=10, ha="center", va="center")
+
+
+def draw_local_frames() -> None:
+    """The three local frames side by side."""
+    figure = pyplot.figure(figsize=(10, 3.6))
+    outward = np.array([[0, 1, 0], [0, 0, -1], [-1, 0, 0]], dtype=float)
+    panels = (
+        ("lvlh, vvlh: z to the source", "x y z", np.eye(3), False),
+        ("rsw, rtn, ric: x outward, z the normal", "x y z", outward, False),
+        ("ned: north, east, to the source", "north east z", np.eye(3), True),
+    )
+    for place, (title, names, columns, pole) in enumerate(panels, 1):
+        local(figure.add_subplot(1, 3, place, projection="3d"), title, names, columns, pole=pole)
+    figure.subplots_adjust(left=0, right=1, bottom=0, top=0.92, wspace=0)
+    save(figure, "local_frames.png")
+
+
+def save(figure: Any, name: str) -> None:
+    """With few colours."""
+    figure.savefig(FIGURES / name, dpi=90)
+    Image.open(FIGURES / name).convert("RGB").quantize(96).save(FIGURES / name, optimize=True)
+
+
 def main() -> None:
-    """Draw all four on one sheet."""
+    """Draw all four conventions on one sheet, and the local frames."""
     figure = pyplot.figure(figsize=(10, 9.2))
     for place, draw in enumerate(
         (quaternion, obliquity, lambda a: euler(a, "zxz"), lambda a: euler(a, "zyx")), 1
     ):
         draw(figure.add_subplot(2, 2, place, projection="3d"))
     figure.subplots_adjust(left=0, right=1, bottom=0, top=0.95, wspace=0, hspace=0.1)
-    path = FIGURES / "conventions.png"
-    figure.savefig(path, dpi=90)
-    Image.open(path).convert("RGB").quantize(96).save(path, optimize=True)
+    save(figure, "conventions.png")
+    draw_local_frames()
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ states are followed over the run by their mean slopes, so that the lasting impul
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import chain, pairwise, product
 from typing import Any
 
@@ -26,7 +26,7 @@ from rigidsim.model.load import Load, Term, force_terms, loads_of, torque_terms
 from rigidsim.model.mechanics import Carrier, Mechanics
 from rigidsim.model.names import written
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.scaling import EstimatedEffect, choose_scaling, scaled_numbers
+from rigidsim.model.scaling import EstimatedEffect, Rounder, choose_scaling, scaled_numbers
 from rigidsim.model.state_blocks import BODY, joined
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, transpose
@@ -86,7 +86,7 @@ def effects_at_start(plan: ModelPlan, groups: Sequence[Sequence[Load]]) -> list[
     if not any(groups):
         return [[] for _ in groups]
     scene, m = plan.scene, probe(plan.scene, plan.requirements, plan.loads)
-    (names, start), unit = start_of(m, plan.loads), m.scaling
+    (names, start), unit = _in_double(start_of(m, plan.loads)), m.scaling
     kinds = [("torque", torque_terms, 2.0**unit.energy, "N m")]
     if m.velocity is not None:
         mass = float(m.carried(scene.body.mass))
@@ -97,7 +97,7 @@ def effects_at_start(plan: ModelPlan, groups: Sequence[Sequence[Load]]) -> list[
         for _, terms_of, *_ in kinds
     ]
     function = hy.cfunc(
-        [x for each in terms for x in _sums(each)], list(hy.make_vars(*names)), compact_mode=True
+        [x for each in terms for x in sums_of(each)], list(hy.make_vars(*names)), compact_mode=True
     )
     values = function(start, time=float(scene.context.ldexp(scene.start, -unit.time)))
     sizes = iter(zip(terms, np.linalg.norm(np.reshape(values, (-1, 3)), axis=1), strict=True))
@@ -105,15 +105,17 @@ def effects_at_start(plan: ModelPlan, groups: Sequence[Sequence[Load]]) -> list[
     return [[(what, float(x) * size, symbol) for what, acts, x, size, symbol in row if acts] for row in rows]
 
 
-def probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> Mechanics:
-    """The scene in double precision with quaternions, in units chosen without these loads."""
+def probe(
+    scene: Scene, requirements: Requirements, loads: Sequence[Load], number: Rounder = float
+) -> Mechanics:
+    """The scene, by default in double precision, with quaternions, in units chosen without these loads."""
     scaling = choose_scaling(scene)
     numbers = scaled_numbers(scene, scaling)
     states = list(hy.make_vars(*BODY.rates))
-    rates = in_common_unit(states, numbers.rate_units, float)
+    rates = in_common_unit(states, numbers.rate_units, number)
     attitude = quaternion_states(scene, rates) if requirements.attitude else None
     return Mechanics.built(
-        scene, scaling, numbers, states, attitude, float,
+        scene, scaling, numbers, states, attitude, number,
         vertical=requirements.vertical, flies=requirements.flight, loads=list(loads),
         orbit_tags=orbit_tags(scene),
     )  # fmt: skip
@@ -125,8 +127,8 @@ def orbit_tags(scene: Scene) -> dict[KeplerOrbit, str]:
     return {orbit: tag for orbit, tag in reversed(orbits) if orbit is not None}
 
 
-def start_of(m: Mechanics, loads: Sequence[Load]) -> tuple[list[str], np.ndarray]:
-    """Names and initial values of all states that the loads may read, internal units."""
+def start_of(m: Mechanics, loads: Sequence[Load]) -> dict[str, Any]:
+    """Initial values (mpf) of all states that the loads may read, by their names, internal units."""
     scene, scaling, context = m.scene, m.scaling, m.scene.context
     values = {
         name: context.ldexp(w, scaling.time - e)
@@ -153,6 +155,10 @@ def start_of(m: Mechanics, loads: Sequence[Load]) -> tuple[list[str], np.ndarray
         extra = load.extra_states(m)
         if extra is not None:
             values |= zip(extra.names, extra.initial, strict=True)
+    return values
+
+
+def _in_double(values: Mapping[str, Any]) -> tuple[list[str], np.ndarray]:
     return list(values), np.array([float(x) for x in values.values()])
 
 
@@ -174,14 +180,15 @@ class _Trial:
         m = self.m = probe(scene, requirements, loads)
         self._loads = loads
         carriers = [x for x in loads_of(scene) if isinstance(x, Carrier)]  # whose states any load may read
-        self.names, self.start = start_of(m, [*loads, *(x for x in carriers if x not in loads)])
+        carrying = [*loads, *(x for x in carriers if x not in loads)]
+        self.names, self.start = _in_double(start_of(m, carrying))
         self._carriers: list[Any] = [load for load in self._loads if isinstance(load, Carrier)]
         torques = [torque_terms(load, m) for load in loads]
         forces = [force_terms(load, m) if m.velocity is not None else [] for load in loads]
         exerted = [load.exerted_torque(m) if isinstance(load, Carrier) else [] for load in loads]
         kinds, self._exerts = (torques, exerted, forces), any(exerted)
-        sums = [x for terms in kinds for x in _sums(chain(*terms))]
-        self._parts = [x for terms in zip(*kinds, strict=True) for x in _sums(chain(*terms))]
+        sums = [x for terms in kinds for x in sums_of(chain(*terms))]
+        self._parts = [x for terms in zip(*kinds, strict=True) for x in sums_of(chain(*terms))]
         in_time = (s.expression for s in surfaces.found if names_used(s.expression) == {"t"})
         narrow = [u for load in self._loads for u in load.narrow(m)] + written(m, in_time)
         zeros = [y for u in narrow for y in (u, _by_time(u))]
@@ -333,7 +340,8 @@ class _Trial:
         blocks = [block for x in self._carriers if (block := x.extra_states(self.m)) is not None]
         if not blocks:
             return np.zeros((1, 3))
-        block, momentum = joined(blocks), _sums(x for y in self._carriers for x in y.carried_momentum(self.m))
+        momentum = sums_of(x for y in self._carriers for x in y.carried_momentum(self.m))
+        block = joined(blocks)
         rows = [self.names.index(name) for name in block.names]
         function = self._compiled([*block.derivatives, *momentum])
         edges, start = np.linspace(0, len(moments) - 1, _CELLS + 1).astype(int), given[rows, :1]
@@ -380,10 +388,10 @@ def _oddness(load: Load, quaternion: np.ndarray, here: float, there: float) -> P
     )
 
 
-def _sums(terms: Iterable[Term]) -> list[Symbolic]:
+def sums_of(terms: Iterable[Term], number: Rounder = float) -> list[Symbolic]:
     """Components of a sum of terms."""
     given = list(terms)
-    return [hy.sum([float(vector[i]) * hy.expression(x) for vector, x in given]) for i in range(3)]
+    return [hy.sum([number(vector[i]) * hy.expression(x) for vector, x in given]) for i in range(3)]
 
 
 def _peak(values: np.ndarray, *, without_mean: bool) -> float:

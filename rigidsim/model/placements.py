@@ -32,7 +32,7 @@ from rigidsim.errors import ConfigError, Problem, ensure, required
 from rigidsim.model.kinematics import Kinematics, seconds
 from rigidsim.model.orbits import KeplerParts, Pull
 from rigidsim.model.rotations import Symbolic, constant, length, unit
-from rigidsim.scene.arithmetic import Vector, cross, norm
+from rigidsim.scene.arithmetic import Vector, cross, minus, norm
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.kernels.ephemeris import Ephemeris
@@ -65,6 +65,8 @@ class OrbitPlane:
         drift: bound of the rate (rad/s) at which the normal turns; None if unknown, 0 if it never does.
         rate: angular rate (mpf, rad/s) of the motion in the plane, or its mean; None if unknown.
         flown: whether it is the plane of the body's own flight.
+        turning: rate of change of ``at_start`` (mpf, 1/s), from the body's acceleration at the start in space
+            axes (m/s^2), which only flights ask for.
     """
 
     normal: Callable[[Kinematics], list[Symbolic]]
@@ -74,6 +76,7 @@ class OrbitPlane:
     drift: Any | None = None
     rate: Callable[[Scene], Any | None] = lambda _: None
     flown: bool = False
+    turning: Callable[[Scene, Callable[[], Vector]], Vector] | None = None
 
 
 def kepler_plane(orbit: KeplerOrbit) -> OrbitPlane:
@@ -83,10 +86,14 @@ def kepler_plane(orbit: KeplerOrbit) -> OrbitPlane:
         turned = orbit.node_rate * scene.start
         return replace(orbit, ascending_node=orbit.ascending_node + turned).normal(scene.context)
 
+    def turning(scene: Scene, _: Callable[[], Vector]) -> Vector:
+        x, y, z = at_start(scene)
+        return [-orbit.node_rate * y, orbit.node_rate * x, 0 * z]
+
     described = "plane of the source's orbit" + (", whose node moves" if orbit.node_rate != 0 else "")
     return OrbitPlane(
         lambda m: m.orbit(orbit).normal, at_start, described, "normal of its orbit",
-        abs(orbit.node_rate), lambda _: abs(orbit.mean_motion),
+        abs(orbit.node_rate), lambda _: abs(orbit.mean_motion), turning=turning,
     )  # fmt: skip
 
 
@@ -96,6 +103,7 @@ def table_plane(table: TabulatedOrbit) -> OrbitPlane:
         lambda m: m.table(table).normal, lambda scene: list(table.normal(scene.start)),
         "plane of the source's orbit, by its table", "normal of its orbit, by its table",
         table.normal_drift, lambda _: abs(table.mean_motion),
+        turning=lambda scene, _: table.rate_of("normal", scene.start),
     )  # fmt: skip
 
 
@@ -116,6 +124,7 @@ def flight_plane(point: Vector) -> OrbitPlane:
     return OrbitPlane(
         lambda m: unit(cross(m.offset_from(point), m.carried(m.velocity))), at_start,
         "osculating plane of the body's own orbit", "normal of the osculating orbit", rate=rate, flown=True,
+        turning=lambda scene, acceleration: cross(minus(scene.position or [], point), acceleration()),
     )  # fmt: skip
 
 
@@ -293,6 +302,11 @@ class Placement:
     def motion_at_start(self, scene: Setting) -> tuple[Vector, Vector, Vector]:
         """The same at the start (mpf, SI)."""
         raise NotImplementedError
+
+    def turning_at_start(self, scene: Setting) -> tuple[Vector, Vector]:
+        """Place and velocity at the start as seen from the body (mpf, SI)."""
+        place, velocity, _ = self.motion_at_start(scene)
+        return place, velocity
 
     # --- of one that the body flies by ----------------------------------------------------------------------
 
@@ -473,6 +487,9 @@ class PlacedByTable(Placement):
     def at_start(self, scene: Setting) -> Vector:
         return self.table.place(scene.start)
 
+    def turning_at_start(self, scene: Setting) -> tuple[Vector, Vector]:
+        return self.at_start(scene), self.table.rate_of("place", scene.start)
+
     def circuit(self, context: Any) -> Circuit:
         table = self.table
         slow = float(table.normal_drift + table.shape_drift)
@@ -583,6 +600,9 @@ class AmongMasses(Placement):
             lambda scene: cross([-x for x in self.at_start(scene)], self.velocity_at_start(scene)),
             "osculating plane of the source's orbit", "normal of the osculating orbit",
             rate=lambda scene: self.encounter(scene)[1],
+            turning=lambda scene, flown: cross(
+                [-x for x in self.at_start(scene)], self.acceleration_at_start(scene, flown)
+            ),
         )  # fmt: skip
 
     def with_point_masses(self, masses: PointMasses) -> Placement:
@@ -590,6 +610,10 @@ class AmongMasses(Placement):
 
     def away(self, m: Kinematics) -> list[Symbolic]:
         """Vector from it to the body, space axes, units of length."""
+        raise NotImplementedError
+
+    def acceleration_at_start(self, scene: Setting, flown: Callable[[], Vector]) -> Vector:
+        """Acceleration of the body as seen from it (mpf, m/s^2); ``flown`` is the body's own in flight."""
         raise NotImplementedError
 
     def encounter(self, scene: Setting) -> tuple[Any, Any]:
@@ -661,6 +685,9 @@ class PlacedAsMass(AmongMasses):
 
     def velocity_at_start(self, scene: Setting) -> Vector:
         return [-v for v in self._relative(scene.context)[1]]
+
+    def acceleration_at_start(self, scene: Setting, flown: Callable[[], Vector]) -> Vector:
+        return [-a for a in self._relative(scene.context)[2]]
 
     def reaction(self, m: Kinematics, pull: list[Symbolic], sign: int) -> list[Pull]:
         one = m.scene.context.one
@@ -879,6 +906,9 @@ class FlownBy(Placement):
         """Vector from it to the body, space axes, units of length."""
         raise NotImplementedError
 
+    def turning_at_start(self, scene: Setting) -> tuple[Vector, Vector]:
+        return self.at_start(scene), [-v for v in self.velocity_at_start(scene)]
+
     def seen(self, m: Kinematics) -> SourcePlace:
         offset, context = self.away(m), m.scene.context
         inverse = 1.0 / length(offset)
@@ -1003,6 +1033,9 @@ class FlownByMass(FlownBy, AmongMasses):
     def velocity_at_start(self, scene: Setting) -> Vector:
         there = self.masses.velocities[self.number]
         return [x - a for x, a in zip(scene.velocity or [], there, strict=True)]
+
+    def acceleration_at_start(self, scene: Setting, flown: Callable[[], Vector]) -> Vector:
+        return minus(flown(), self.masses.pulled(self.number, scene.context))
 
     def encounter(self, scene: Setting) -> tuple[Any, Any]:
         place, strength = [-x for x in self.at_start(scene)], self.masses.strengths[self.number]

@@ -26,7 +26,7 @@ def _within(context: Any) -> Rotations:
 
     functions = sine, cosine, context.atan2, context.hypot
     is_tiny = lambda length: bool(length < tiny)  # noqa: E731
-    return Rotations(*functions, constant=context.mpf, negligible=is_tiny, total=_total)
+    return Rotations(*functions, constant=context.mpf, negligible=is_tiny, total=total)
 
 
 def _without_rounding(value: Any, terms: Sequence[Any]) -> Any:
@@ -38,13 +38,14 @@ def _without_rounding(value: Any, terms: Sequence[Any]) -> Any:
     return value * 0 if abs(value) < negligible(context) * size else value
 
 
-def _total(terms: Sequence[Any]) -> Any:
+def total(terms: Sequence[Any]) -> Any:
+    """Sum of terms, or zero if it is their rounding."""
     return _without_rounding(rotations.from_left(terms), terms)
 
 
 def product(p: Sequence[Any], q: Sequence[Any]) -> Vector:
     """Hamilton product p q (first q, then p, as rotations body to space)."""
-    return rotations.product(p, q, _total)
+    return rotations.product(p, q, total)
 
 
 def rotation_matrix(q: Vector) -> Matrix:

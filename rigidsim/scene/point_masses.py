@@ -90,18 +90,19 @@ class PointMasses:
 
     def relative(self, i: int, j: int, context: Any) -> tuple[Vector, Vector, Vector]:
         """Place, velocity and acceleration of mass j as seen from mass i, under mutual gravity."""
-
-        def pulled(n: int) -> Vector:
-            found = [context.zero] * 3
-            for other, strength in enumerate(self.strengths):
-                if other != n:
-                    towards = minus(self.positions[other], self.positions[n])
-                    size = strength / norm(context, towards) ** 3
-                    found = plus(found, [size * y for y in towards])
-            return found
-
         moving = minus(self.velocities[j], self.velocities[i])
-        return minus(self.positions[j], self.positions[i]), moving, minus(pulled(j), pulled(i))
+        accelerations = [self.pulled(n, context) for n in (j, i)]
+        return minus(self.positions[j], self.positions[i]), moving, minus(*accelerations)
+
+    def pulled(self, n: int, context: Any) -> Vector:
+        """Acceleration of mass n by the others."""
+        found = [context.zero] * 3
+        for other, strength in enumerate(self.strengths):
+            if other != n:
+                towards = minus(self.positions[other], self.positions[n])
+                size = strength / norm(context, towards) ** 3
+                found = plus(found, [size * y for y in towards])
+        return found
 
     def encounter(self, context: Any, one: int, other: int) -> tuple[Any, Any]:
         """See ``closest``, for two of the masses."""

@@ -83,6 +83,7 @@ _ABOUT_NAME = (
     "1 to 100 letters, digits, dots, underscores and hyphens, not dots alone, since it names the run folder"
 )
 _ABOUT_LOADS = "loads that act on the body, each of a kind; without any the body rotates freely"
+LOCAL_FRAMES = ("lvlh", "vvlh", "rsw", "rtn", "ric", "ned")
 EQUILIBRIUM_NAMES = ("relative", "cassini_1", "cassini_2", "cassini_3", "cassini_4")
 
 
@@ -96,12 +97,12 @@ class Initial(ConfigTable):
     angular_velocity: Triple[Rate] | None = Field(
         None, examples=[[0.1, 1.0, 0.05], ["0 deg/s", "0 deg/s", "20 deg/h"]]
     )
-    """angular velocity relative to space, in body axes; this or angular_momentum"""
+    """angular velocity relative to space or to relative_to, in body axes; this or angular_momentum"""
     angular_momentum: Triple[Momentum] | None = Field(None, examples=[[0, 0, 12.5]])
     """angular momentum in space axes, instead of angular_velocity"""
     quaternion: Annotated[Four[Dimensionless], NotZero] | None = Field(None, examples=[[1, 0, 0, 0]])
-    """attitude w, x, y, z: takes body axes to space axes; any norm but zero; by default the body axes start
-    along the space axes
+    """attitude w, x, y, z: takes body axes to space axes (or those of relative_to); any norm but zero; by
+    default the body axes start along these
     """
     euler_angles: Triple[Angle] | None = Field(None, examples=[["10 deg", "23.44 deg", "0 deg"]])
     """phi, theta, psi of [integrator] euler_sequence, intrinsic; instead of quaternion"""
@@ -126,6 +127,11 @@ class Initial(ConfigTable):
     equilibrium: Annotated[str, OneOf(EQUILIBRIUM_NAMES)] | None = None
     """start in an equilibrium, which is found: relative (at rest in the frame of a circular orbit; the stable
     one, or the one nearest to an attitude that is given), or a Cassini state of an orbit whose node moves
+    """
+    relative_to: Annotated[str, OneOf(LOCAL_FRAMES)] | None = None
+    """local frame of the orbit from which attitude and rates count, and whose rate is added: lvlh or vvlh (x
+    forward, y against the orbit's normal, z to the source), rsw, rtn or ric (outward, forward, normal), ned
+    (north, east, to the source)
     """
     position: Triple[Metre] | None = Field(None, examples=[["7000 km", 0, 0]])
     """position of the centre of mass, in space axes; with it or velocity the body flies freely"""

@@ -220,9 +220,8 @@ NAMED_OTHERWISE = {
     "a force at a point of the body is force (docs/loads/torque.md)": (
         "external_force", "applied_force", "body_force", "constant_force",
     ),
-    "a start against the local frame of an orbit isn't there yet: equilibrium = \"relative\" rests in it, "
-    "and euler_angles in the sequence zxz (node, inclination, argument of latitude of the source's place) "
-    "put body x to the source and z along the orbit's normal (docs/starts.md, docs/observables.md)": (
+    "a start against the local frame of an orbit is relative_to in [initial], \"lvlh\" or \"rsw\" "
+    "(docs/starts.md)": (
         "lvlh", "vvlh", "rtn", "ric", "rsw", "rsw_frame", "ntw", "tnw", "hill", "orbital_frame",
         "local_orbital", "lvlh_frame", "local_vertical", "local_frame", "nadir",
     ),

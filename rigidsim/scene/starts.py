@@ -68,6 +68,8 @@ _BESIDE = {"node_longitude": ("obliquity",), "prime_meridian": ("pole", "obliqui
 """Keys that give nothing alone, and what each counts with."""
 _BESIDE_FOUND = {"relative": ATTITUDES}
 """What may stand beside an equilibrium; a Cassini state takes a period."""
+_IN_SPACE = ("pole", "obliquity", "angular_momentum", "equilibrium")
+"""Keys that count in space, whatever turns."""
 STARTS: dict[str, Callable[[Any], InitialRotation]] = {}
 """Starts that rooms above find, by names of equilibria and keys: from the scene so far; ConfigError."""
 
@@ -98,6 +100,9 @@ def check_ways(table: Initial) -> None:
     for key, takers in _BESIDE.items():
         text = f"given without {' or '.join(takers)}, with which it counts; add that"
         ensure(getattr(table, key) is None or _given(table, takers), refusal(key, text))
+    for key in _given(table, _IN_SPACE) if table.relative_to is not None else ():
+        text = f'given with relative_to = "{table.relative_to}", but counts in space; remove one of them, or '
+        raise refusal(key, text + "give quaternion or euler_angles, with angular_velocity or spin_period")
     known = table.obliquity is None or table.node_longitude is not None
     ensure(known, refusal("node_longitude", "missing; obliquity needs it"))
 
@@ -106,8 +111,16 @@ def _given(table: Initial, keys: Iterable[str]) -> list[str]:
     return [key for key in keys if getattr(table, key) is not None]
 
 
-def attitude_of(scene: Setting) -> InitialRotation:
-    """The attitude at the start of a scene; by default the body axes are along the space axes."""
+def attitude_of(scene: Any) -> InitialRotation:
+    """The attitude at the start of a scene, in space."""
+    given = given_attitude(scene)
+    if scene.config.initial.relative_to is None:
+        return given
+    return STARTS["relative attitude"](scene.started(given))
+
+
+def given_attitude(scene: Setting) -> InitialRotation:
+    """The attitude as given, in space or in a local frame; by default the body axes are along its axes."""
     table = scene.config.initial
     if table.pole is not None:
         return _from_pole(scene)
@@ -132,6 +145,8 @@ def rotation_of(scene: Any) -> InitialRotation:
         elif key == "spin_period":
             rates = [spin_rate(scene) * x for x in scene.figure.pole]
         start = InitialRotation(scene.quaternion, rates, scene.euler_angles)
+        if table.relative_to is not None:
+            start = STARTS["relative rates"](scene.started(start))
     what = "has a spin about the axis that has no moment of inertia, where a spin means nothing; make that "
     ensure(not _along_massless(scene.body, start.angular_velocity), refusal(key, what + "component zero"))
     return start

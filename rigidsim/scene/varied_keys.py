@@ -2,8 +2,8 @@
 for, and the same scene with other numbers there.
 
 ``initial.attitude`` stands for a rotation vector (body axes, rad) by which the config's own start is turned;
-its value is zero. The angular velocity in body axes is kept thereby, unless the config gives the momentum in
-space. A tensor of inertia stays symmetric: an entry beside the diagonal stands for both.
+its value is zero. The angular velocity that the config gives is kept thereby, or the momentum in space. A
+tensor of inertia stays symmetric: an entry beside the diagonal stands for both.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from rigidsim.scene.exact import ExactNumber, fraction_of
 from rigidsim.scene.paths import Path, leaves
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.scene.schema import config_model
-from rigidsim.scene.starts import from_momentum
+from rigidsim.scene.starts import rotation_of
 
 ATTITUDE = "initial.attitude"
 _TABLES = ("body", "initial", "loads", "rotors", "parameters", "states", "bodies")
@@ -111,9 +111,7 @@ def _turned(scene: Scene, vector: Sequence[Any]) -> Scene:
     factor = context.sin(angle / 2) / angle
     turn = [context.cos(angle / 2), *(factor * x for x in vector)]
     turned = replace(scene, quaternion=list(product(scene.quaternion, turn)), euler_angles=None)
-    if scene.config.initial.angular_momentum is None:
-        return turned
-    return replace(turned, angular_velocity=from_momentum(turned))
+    return turned.started(rotation_of(turned))
 
 
 # --- from texts to numbers ----------------------------------------------------------------------------------

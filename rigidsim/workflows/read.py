@@ -10,7 +10,8 @@ from typing import Any
 
 import rigidsim.model.loads
 import rigidsim.model.observables.mechanical
-import rigidsim.solve.equilibria  # noqa: F401  (each enters what it defines into a registry of rigidsim.scene)
+import rigidsim.solve.equilibria
+import rigidsim.solve.local_frames  # noqa: F401  (each enters what it defines into a registry of rigidsim.scene)
 from rigidsim.errors import ConfigError, Problem, RunFolderError, run_again
 from rigidsim.scene.config import Experiment, Overrides, parse
 from rigidsim.scene.config import load as load_file

@@ -250,9 +250,14 @@ class TabulatedOrbit:
 
     def place(self, time: Any) -> list[Any]:
         """Place of the attracting body at a time, m, space axes."""
-        found = self.at(time)
+        return self._place_of(self._moving_elements(time))
+
+    def _moving_elements(self, time: Any) -> dict[str, Any]:
+        return {**self.at(time), LONGITUDE: self.starting_longitude(time)}
+
+    def _place_of(self, found: Mapping[str, Any]) -> list[Any]:
         regular = tuple(found[x] for x in (*EXCENTRIC, *TILTED))
-        longitude = self.eccentric_longitude(found, self.starting_longitude(time))
+        longitude = self.eccentric_longitude(found, found[LONGITUDE])
         turn = self.context.cos(longitude), self.context.sin(longitude)
         return [found[AXIS] * x for x in regular_place(self.context, regular, turn)]
 
@@ -308,9 +313,27 @@ class TabulatedOrbit:
 
     def normal(self, time: Any) -> list[Any]:
         """Unit normal at a time (s) about which the motion is direct, space axes."""
-        q, p = (self.at(time)[name] for name in TILTED)
+        return self._normal_of(self.at(time))
+
+    def _normal_of(self, found: Mapping[str, Any]) -> list[Any]:
+        q, p = (found[name] for name in TILTED)
         chi = self.context.sqrt(1 - p * p - q * q)
         return [2 * p * chi, -2 * q * chi, 1 - 2 * (p * p + q * q)]
+
+    def rate_of(self, quantity: str, time: Any) -> list[Any]:
+        """Rate of change of the "place" or "normal" at a time (s), by differences of twice the digits."""
+        number, begun = self.number_at(time), self._moving_elements(time)
+        begin, end = self.time(number), self.time(number + 1)
+        x, rates = (time - begin) / (end - begin), {LONGITUDE: self.motion(begun[AXIS])}
+        for name, c in self.piece(number).items():
+            slope = (((5 * c[5] * x + 4 * c[4]) * x + 3 * c[3]) * x + 2 * c[2]) * x + c[1]
+            rates[name] = slope / (end - begin)
+        function = self._place_of if quantity == "place" else self._normal_of
+
+        def moved(seconds: Any, axis: int) -> Any:
+            return function({n: v + rates.get(n, 0) * seconds for n, v in begun.items()})[axis]
+
+        return [self.context.diff(lambda t, axis=axis: moved(t, axis), 0) for axis in range(3)]
 
     @property
     def mean_motion(self) -> Any:

@@ -36,6 +36,7 @@ from rigidsim.scene.row_rotations import conjugated, multiplied, normalised, of_
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.scene.schema import Config, FitDataTable, KnownWithin
 from rigidsim.scene.space_axes import SpaceAxes
+from rigidsim.scene.starts import given_attitude, spin_rate
 from rigidsim.scene.units import powers, unit_text
 from rigidsim.scene.validation_messages import nearest, shown
 from rigidsim.scene.varied_keys import ATTITUDE, VariedKey, varied_keys
@@ -518,11 +519,11 @@ class FitKeys:
     def _start(self, turn: np.ndarray) -> list[str]:
         """The attitude at the start turned by a rotation vector, instead of whatever gives it."""
         initial = self.scene.config.initial
-        given = np.array([float(x) for x in self.scene.quaternion])
+        given = np.array([float(x) for x in given_attitude(self.scene).quaternion])
         quaternion = multiplied(given[None, :], of_vector(turn[None, :]))[0]
         texts = [f"initial.{name}=" for name in _FORMS if getattr(initial, name) is not None]
         if initial.spin_period is not None:
-            rates = ", ".join(repr(float(w)) for w in self.scene.angular_velocity)
+            rates = ", ".join(repr(float(spin_rate(self.scene) * x)) for x in self.scene.figure.pole)
             texts += ["initial.spin_period=", f"initial.angular_velocity=[{rates}]"]
         shown_values = ", ".join(repr(float(x)) for x in quaternion)
         return [*texts, f"initial.quaternion=[{shown_values}]"]
