@@ -47,33 +47,35 @@ def apart(reduced: rigidsim.Run, full: rigidsim.Run) -> dict[str, float]:
     }
 
 
-def test_an_axisymmetric_body_decays_exactly() -> None:
+@pytest.mark.parametrize("end", [1e5, -1e5])
+def test_an_axisymmetric_body_decays_exactly(end: float) -> None:
     """w1, w2 = e^(-c t / A), w3 = e^(-d t / C): nothing is lost in averaging, nor anything in steps."""
-    moments, damping, end = np.array([1.0, 1.0, 2.0]), np.array([1e-4, 1e-4, 1.5e-4]), 1e5
+    moments, damping = np.array([1.0, 1.0, 2.0]), np.array([1e-4, 1e-4, 1.5e-4])
     loads = f'kind = "viscous_torque"\ncoefficients = {damping.tolist()}'
     run = run_text(text("spin_averaged", loads, end, "principal_moments = [1, 1, 2]"))
     times = values(run, "time")
     rates = np.array([0.4, 0.5, 1.2])[:, None] * np.exp(-(damping / moments)[:, None] * times)
     size = np.linalg.norm(moments[:, None] * rates, axis=0)
     energy = (moments[:, None] * rates**2).sum(axis=0) / 2
-    # ten e-foldings: the states err by the tolerance, relative to the start
+    # ten e-foldings: the states err by the tolerance, relative to where they are largest
     bound = 1024 * EPS
-    np.testing.assert_allclose(values(run, "angular_momentum_norm"), size, atol=bound * size[0])
-    np.testing.assert_allclose(values(run, "energy"), energy, atol=bound * energy[0])
+    np.testing.assert_allclose(values(run, "angular_momentum_norm"), size, rtol=0, atol=bound * size.max())
+    np.testing.assert_allclose(values(run, "energy"), energy, rtol=0, atol=bound * energy.max())
     assert np.abs(np.diff(values(run, "momentum_axis"), axis=0)).max() <= 4 * EPS
     assert run.summary["cost"]["steps"] < 100
 
 
+@pytest.mark.parametrize("end", cases([4000, -4000], [4000]))
 @pytest.mark.parametrize(
     "more", cases(["", f"\n[[loads]]\n{GRADIENT}"], [""]), ids=["alone", "with a gradient"]
 )
-def test_the_announced_errors_cover_the_true_ones(more: str) -> None:
+def test_the_announced_errors_cover_the_true_ones(more: str, end: float) -> None:
     loads = viscous(1e-4) + more
-    full = run_text(text("full", loads, 4000))
-    run = run_text(text("spin_averaged", loads, 4000), estimate=True)
+    full = run_text(text("full", loads, end))
+    run = run_text(text("spin_averaged", loads, end), estimate=True)
     assert run.summary["cost"]["steps"] < 0.03 * full.summary["cost"]["steps"]
-    lost = 1 - values(full, "angular_momentum_norm")[-1] / values(full, "angular_momentum_norm")[0]
-    assert lost > 0.2  # so that there is something to follow
+    size = values(full, "angular_momentum_norm")
+    assert np.ptp(size) > 0.2 * size.max()  # so that there is something to follow
     announced, true = run.summary["modelling"], apart(run, full)
     for name, error in true.items():
         assert error <= announced[name] <= 4 * error, name

@@ -627,14 +627,10 @@ def driven_by(
         axial -= context.ldexp(context.mpf(float(removed[0])), exponent)
         across -= context.ldexp(context.mpf(float(removed[1])), exponent)
         start = [float(context.ldexp(x, -exponent)) for x in (axial, across)]
-    ensure(
-        scaling.direction > 0,
-        refused(level, "torques that change the size of the momentum aren't averaged backwards in time"),
-    )
-    begin, end = (float(context.ldexp(x, -scaling.time)) for x in (scene.start, scene.end))
+    begin, end = (float(scaling.internal(x, context)) for x in (scene.start, scene.end))
     times, course, fastest, failure = _followed(torques, np.array(start), begin, end)
     if failure:
-        until, what = float(np.ldexp(times[-1], scaling.time)), f'given "{level}", but {failure}'
+        until, what = float(scaling.seconds(times[-1])), f'given "{level}", but {failure}'
         if len(times) > 1:
             what += f" after {until:.6g} s ({span_text(until)}): end the run by then, or"
         raise ConfigError(Problem("[model] level", what + ' choose level = "full"'))
@@ -654,16 +650,17 @@ def driven_by(
 def _followed(
     torques: DrivingTorques, now: np.ndarray, begin: float, end: float
 ) -> tuple[np.ndarray, np.ndarray, float, str]:
-    """Times, amplitudes and the fastest relative rate, by Runge-Kutta steps of the fourth order, and what
-    ended them before the run's end.
+    """Internal times, amplitudes and the fastest relative rate, by Runge-Kutta steps of the fourth order, and
+    what ended them before the run's end.
     """
+    way = torques.scaling.direction
     time, fastest, part, failure = begin, 0.0, 1.0, ""
     times, amplitudes, initial = [time], [now], float(np.linalg.norm(now))
     if not torques.parameter_at(now) < 1:  # where strong torques leave it, less their periodic part
         return np.array(times), np.array(amplitudes), fastest, _SEPARATRIX
 
     def rate(state: np.ndarray) -> np.ndarray:
-        return torques.mean(float(state[0]), float(state[1]), _NODES)
+        return way * torques.mean(float(state[0]), float(state[1]), _NODES)
 
     while time < end and not failure:
         first = rate(now)
@@ -728,8 +725,8 @@ def _passed(
     """
     scaling, total = torques.scaling, 0.0
     places = np.linspace(times[0], times[-1], _PLACES)
-    seconds = np.ldexp(places, scaling.time)
-    apart = float(seconds[1] - seconds[0])
+    seconds = scaling.seconds(places)
+    apart = abs(float(seconds[1] - seconds[0]))
     polhodes = np.array([np.interp(places, times, amplitude) for amplitude in course.T]).T
     own = [torques.wobble(*polhode) for polhode in polhodes]
     moments = torques.polhodes.moments
