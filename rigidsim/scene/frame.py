@@ -18,7 +18,7 @@ SPACE = "space"
 
 
 class Frame(ConfigTable):
-    """``[frame]``: what the scene's axes are called, and what angles are counted from."""
+    """``[frame]``: names of the scene's axes, and references of angles."""
 
     axes: SpaceAxes | None = None
     """name of the space axes; with an ephemeris they are ecliptic J2000"""
@@ -34,8 +34,8 @@ class Frame(ConfigTable):
     orbit), or a normal [x, y, z] in space axes
     """
     figure_axis: Literal["x", "y", "z", "largest", "symmetry"] | None = None
-    """the body axis to which obliquity, wobble and polar motion refer; by default the axis of symmetry, or
-    that of the largest moment if there is none
+    """the body axis to which obliquity, wobble and polar motion refer; by default the axis of symmetry,
+    or else the axis of largest moment
     """
 
 

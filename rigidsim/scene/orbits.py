@@ -140,8 +140,8 @@ class OrbitFields(LoadFields):
 
     orbit: Orbit | None = Field(
         default=None,
-        description="place of the source as seen from the body, by elements: a satellite's source is "
-        "opposite to the satellite's own elements, which are satellite_orbit",
+        description="place of the source as seen from the body, by elements: for a satellite's elements "
+        "use satellite_orbit",
         examples=[{"semi_major_axis": "1 au", "eccentricity": 0.0167}],
     )
     satellite_orbit: SatelliteOrbit | None = Field(

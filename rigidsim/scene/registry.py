@@ -31,7 +31,7 @@ class LoadFields(ConfigTable):
     """Base of the keys that one kind of load takes; each adds ``kind: Literal["name"]``."""
 
     name: VariableName | None = Field(None, examples=["sun"])
-    """name of the load; expressions then read ux_NAME uy_NAME uz_NAME r_NAME shadow_NAME of its source"""
+    """name of the load; expressions can then read ux_NAME uy_NAME uz_NAME r_NAME shadow_NAME"""
 
     def placed_by(self, *, free_flight: bool) -> frozenset[str] | None:
         """States of the body (``Readable.states``) that the place of its source as seen from there depends
@@ -44,7 +44,7 @@ class SourceFields(LoadFields):
     """Keys of a load whose source is a body at a known place."""
 
     radius: Positive[Metre] | None = Field(None, examples=["6378.137 km"])
-    """radius of the source, for shadow_NAME and altitude in expressions; the load itself takes a point"""
+    """radius of the source, for shadow_NAME and altitude in expressions; forces are a point's"""
 
     def placed_by(self, *, free_flight: bool) -> frozenset[str] | None:
         """States of a flight, if its source is a body that moves by itself."""

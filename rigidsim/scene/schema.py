@@ -107,8 +107,7 @@ class Initial(ConfigTable):
     euler_angles: Triple[Angle] | None = Field(None, examples=[["10 deg", "23.44 deg", "0 deg"]])
     """phi, theta, psi of [integrator] euler_sequence, intrinsic; instead of quaternion"""
     pole: Pair[Angle] | None = Field(None, examples=[["317.68 deg", "52.89 deg"]])
-    """right ascension and declination (J2000) of the figure axis; instead of quaternion, where [frame] axes
-    says what the space axes are
+    """right ascension and declination (J2000) of the figure axis; instead of quaternion; needs [frame] axes
     """
     prime_meridian: Angle | None = Field(None, examples=["176.6 deg"])
     """the IAU's W, with pole: from the ascending node of its equator on the equator of J2000, along the
@@ -123,7 +122,7 @@ class Initial(ConfigTable):
     prime_meridian the figure's prime meridian starts there
     """
     spin_period: Annotated[Second, _NOT_ZERO] | None = Field(None, examples=["25 h"])
-    """time of a turn about the figure axis, instead of angular_velocity; negative: the other way round"""
+    """time of a turn about the figure axis, instead of angular_velocity; negative: opposite sense"""
     equilibrium: Annotated[str, OneOf(EQUILIBRIUM_NAMES)] | None = None
     """start in an equilibrium, which is found: relative (at rest in the frame of a circular orbit; the stable
     one, or the one nearest to an attitude that is given), or a Cassini state of an orbit whose node moves
@@ -146,8 +145,8 @@ class Initial(ConfigTable):
             ]
         ],
     )
-    """two-line elements of a satellite of the Earth, instead of position and velocity: these are SGP4's at
-    the start, in GCRF; without [time] epoch their date is time 0
+    """two-line elements of a satellite of the Earth, instead of position and velocity: SGP4 gives the
+    start in GCRF; without [time] epoch their date is time 0
     """
     frame: Literal["GCRF", "ICRF", "EME2000", "J2000", "TEME", "ITRF"] | None = None
     """frame of position and velocity, at the date of [time] epoch, instead of the space axes; about the
@@ -195,7 +194,7 @@ class Model(ConfigTable):
 
 
 class TidesTable(ConfigTable):
-    """``[tides]``: slow changes of the rotation, and of the distance of what raises the tides."""
+    """``[tides]``: slow changes of the rotation, and of the distance of the body that raises tides."""
 
     model: Literal["linear", "constant_lag"] = "linear"
     """linear has the present rates of the Earth and Moon for all times; constant_lag follows the distance"""
@@ -230,16 +229,16 @@ class Output(ConfigTable):
     record: EachOnce[Annotated[str, OneOf(OBSERVABLES, of_scene="states")]] | None = Field(
         None, examples=[["quaternion", "obliquity"]]
     )
-    """names of the variables to record; by default those that suit the scene (drifts of invariants are always
-    recorded)
+    """names of the variables to record; by default variables that suit the scene (drifts of invariants are
+    always recorded)
     """
     timeline: StrictBool = True
     """write timeline.rrd, for rigidsim view"""
     timeline_rows: StrictInt = Field(100_000, ge=2)
     """largest number of rows in the timeline; longer runs are thinned there, never in the dataset"""
     estimate: StrictBool = True
-    """estimate the errors of attitude and position; costs a few percent of the run, in batches of a sweep one
-    to two times the members themselves
+    """estimate the errors of attitude and position; costs a few percent of the run, in batches of a sweep
+    one to two times as much as the members
     """
     lyapunov: StrictBool = False
     """Lyapunov exponents from variational equations; costs tens of times the plain run"""
@@ -252,7 +251,7 @@ class Output(ConfigTable):
     binary, from the config's folder; its SHA-256 is kept in the dataset
     """
     orientation_of: BodyName | None = Field(None, examples=["mars", 31006])
-    """the body in that kernel, by its name or number, or the number of axes in a binary one; by default
+    """the body in that kernel, by its name or number, or the number of axes in a binary kernel; by default
     [body] host, or the only axes of a binary kernel
     """
     insolation: Insolation | None = Field(
@@ -420,7 +419,7 @@ MOST_EVENTS = 100_000
 
 
 class AxisTable(ConfigTable):
-    """One axis: the values that a key takes, said in one of seven ways."""
+    """One axis: the values that a key takes, given in one of seven ways."""
 
     linspace: Triple[Any] | None = None
     """[from, to, count], both ends included"""
@@ -441,8 +440,8 @@ class AxisTable(ConfigTable):
     grid: Pair[StrictInt] | None = None
     """for sphere: numbers of polar angles (equally spaced in their cosine) and azimuths"""
     name: StrictStr | None = None
-    """name of the dimension; by default the last part of the key, or the whole key where the last part is the
-    name of something recorded
+    """name of the dimension; by default the last part of the key, or the whole key if the last part names
+    a recorded variable
     """
 
     @model_validator(mode="after")
@@ -488,8 +487,8 @@ class SweepTable(ConfigTable):
     tile: StrictInt | None = Field(None, ge=1, le=LARGEST_TILE)
     """number of members computed and saved together; by default some seconds of work"""
     batch: StrictBool = True
-    """integrate members that share their equations side by side; false: each by itself, which takes many
-    times as long
+    """integrate members that share their equations in batches; false: each alone, which takes many times
+    as long
     """
     impossible: Literal["refuse", "mark"] = "refuse"
     """members that can't be run: refuse the sweep before any of them runs, or mark those as "refused", with
@@ -504,7 +503,7 @@ _ONE_OR_MORE = Range(lambda x: x >= 1, "1 or more")
 
 
 class KnownWithin(ConfigTable):
-    """How well a value is known besides the data."""
+    """Prior knowledge of a value."""
 
     sigma: Any = Field(examples=[0.1, "1e10 m^3/s^2", [0.1, 0.1, 0.2]])
     """standard deviation about the config's value, in the unit of the key; of a vector one for all its
@@ -520,12 +519,12 @@ class KnownWithin(ConfigTable):
 
 
 class FitDataTable(ConfigTable):
-    """``[[fit.data]]``: one set of observations, at its own times."""
+    """``[[fit.data]]``: one set of observations with times."""
 
     file: StrictStr = Field(examples=["observed.csv"])
     """CSV, Parquet, netCDF, AEM, OEM, CK, or the dataset of a run; its path from the config's folder"""
     kernels: EachOnce[StrictStr] = Field(default_factory=list, examples=[["clock.tsc", "leapseconds.tls"]])
-    """of a CK: the clock (SCLK) and what else SPICE reads it with; paths from the config's folder"""
+    """of a CK: the clock (SCLK) and other kernels that SPICE needs; paths from the config's folder"""
     time: StrictStr = Field("time", examples=["time", "utc"])
     """column of the times: seconds of the run, or dates"""
     observable: StrictStr = Field(examples=["quaternion", "angular_velocity", "wz^2"])
@@ -558,16 +557,16 @@ class FitTable(ConfigTable):
         min_length=1, examples=[["initial.attitude", "initial.angular_velocity", "body.principal_moments[0]"]]
     )
     """dotted keys with indices from 0 whose values are estimated, in this order everywhere; initial.attitude
-    is a rotation vector in body axes from the config's attitude; the config's values are where it starts
+    is a rotation vector in body axes from the config's attitude; the fit starts at the config's values
     """
     prior: dict[StrictStr, KnownWithin] = Field(default_factory=dict)
     """by key: how well a parameter is known beforehand"""
     consider: dict[StrictStr, KnownWithin] = Field(default_factory=dict)
-    """by key: how uncertain values are that are not estimated; it counts in the sigmas of those that are"""
+    """by key: uncertainty of values that aren't estimated; it adds to the sigmas of estimated values"""
     data: list[FitDataTable] = Field(min_length=1)
     """the observations"""
     starts: StrictInt = Field(1, ge=1, le=MOST_STARTS)
-    """number of starts: the config's values, and others drawn from the priors; the best end is taken"""
+    """number of starts: the config's values, and others drawn from the priors; the best result is kept"""
 
     @model_validator(mode="after")
     def _either(self) -> FitTable:
@@ -596,11 +595,11 @@ class RotorTable(ConfigTable):
     rate: Rate = Field(ZERO, examples=["300 rad/s", "3000 rpm"])
     """rate about its axis relative to the body, at the start"""
     torque: Formula | None = Field(None, examples=["-k*wz"])
-    """torque of its motor on it, N m: an expression of t, the state and [parameters]; its reaction acts on
-    the body; without it the rotor turns freely
+    """torque of the motor on the rotor, N m: an expression of t, the state and [parameters]; its reaction
+    acts on the body; without it the rotor turns freely
     """
     fixed: StrictBool = False
-    """a motor keeps the rate, whatever torque that takes"""
+    """a motor keeps the rate, with any torque needed"""
 
 
 _NUMBER = ("", "1")
@@ -611,15 +610,14 @@ class OwnStateTable(ConfigTable):
     """``[[states]]``: a user-defined state, integrated with the motion and readable in every expression."""
 
     name: VariableName = Field(examples=["integral"])
-    """its name in expressions, and of its variable in the dataset"""
+    """name in expressions, and of the variable in the dataset"""
     initial: AnyQuantity = Field(ZERO, json_schema_extra={"x-unit-key": "unit"})
     """value at the start, SI or with its unit"""
     unit: StrictStr | None = Field(None, examples=["rad", "N m s"])
-    """its SI unit, "1" for a number: labels the dataset, and is checked in its derivative and where it
-    is read
+    """SI unit, "1" for a number; labels the dataset, and is checked in every expression
     """
     derivative: Formula = Field(examples=["wz", "(2*k*qz - torque)/(2 s)"])
-    """its rate of change in SI: an expression of t, the state, [[states]] and [parameters]"""
+    """rate of change in SI: an expression of t, the state, [[states]] and [parameters]"""
 
     @field_validator("name")
     @classmethod

@@ -550,14 +550,14 @@ class SourceFigureTable(ConfigTable):
     """``figure`` of a source: its oblateness."""
 
     J2: Annotated[Dimensionless, _POSSIBLE] = Field(examples=[1.0826e-3])
-    """its unnormalized coefficient J2 = -C20"""
+    """unnormalized coefficient J2 = -C20"""
     radius: Positive[Metre] = Field(examples=["6378.137 km"])
-    """its equatorial radius, to which J2 refers"""
+    """equatorial radius, to which J2 refers"""
     pole: Annotated[
         Annotated[Literal["iau1976"], Tag(NAME_OR_VECTOR[0])] | Annotated[Direction, Tag(NAME_OR_VECTOR[1])],
         name_or_vector('"iau1976" (the Earth\'s, by precession and nutation) or a vector in space axes'),
     ] = Field(examples=["iau1976", [0, 0, 1]])
-    """direction of its axis of figure: a vector in space axes, or iau1976, the Earth's of date"""
+    """direction of the axis of figure: a vector in space axes, or iau1976, the Earth's of date"""
 
 
 @register_load(beside="figure")

@@ -564,12 +564,13 @@ class EddyCurrentsFields(MagneticFieldFields):
         default=None, description="of the sphere, outside", examples=["30 cm"]
     )
     thickness: Positive[Metre] | None = Field(
-        default=None, description="of the wall of a hollow sphere; a solid one without it", examples=["2 mm"]
+        default=None,
+        description="of the wall of a hollow sphere; without it the sphere is solid",
+        examples=["2 mm"],
     )
     magnetic_tensor: Triple[NotNegative[MagneticTensor]] | None = Field(
         default=None,
-        description="moments of M about the body axes, of another conductor, instead of conductivity and "
-        "radius",
+        description="diagonal of M in body axes, for another conductor, instead of conductivity and radius",
         examples=[["2.1e4 S m^4", "2.1e4 S m^4", "9.8e3 S m^4"]],
     )
 

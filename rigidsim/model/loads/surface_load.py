@@ -420,7 +420,7 @@ Density = Annotated[Any, NumberOrFormula("kg/m^3")]
 
 
 class DragFields(LoadFields):
-    """Drag on the body's surfaces of the air about the body that it flies about."""
+    """Drag of the air on the surfaces of a body in flight."""
 
     rules = (together("altitude", "scale_height"), together("f107", "f107a", "ap"))
     kind: Literal["drag"]

@@ -180,7 +180,7 @@ class ElasticityTable(ConfigTable):
     radius: Positive[Metre] = Field(examples=["1738 km"])
     """radius that the Love number refers to"""
     delay: NotNegative[Second] = Field(ZERO, examples=["0.108 day"])
-    """time by which the distortion lags behind its cause; without one nothing is dissipated"""
+    """time by which the distortion lags behind its cause; without a delay nothing is dissipated"""
     mean_rate: Rate | None = Field(None, examples=["0.2299715 rad/day"])
     """spin about the figure axis whose distortion is in the body's moments already; by default the rate at
     the start
@@ -207,13 +207,13 @@ class Core(ConfigTable):
     """A fluid core that turns by itself: symmetric about the body's axis of largest moment."""
 
     moment: Annotated[Dimensionless, _PART] = Field(examples=[0.0007])
-    """its moment about that axis, over the body's own, which includes it; at least 0 and below 1"""
+    """moment of the core about that axis, over the body's moment (core included); at least 0 and below 1"""
     flattening: Annotated[Dimensionless, within("0", "0.5")] = Field(ZERO, examples=[3.8e-4])
-    """(C_c - A_c) / C_c of its moments, from 0 to 0.5: by it the mantle's pressure turns it"""
+    """(C_c - A_c) / C_c of the core's moments, from 0 to 0.5; by it the mantle's pressure turns the core"""
     friction: NotNegative[PerSecond] = Field(ZERO, examples=["1.5e-8 day^-1"])
-    """torque of the mantle on it per difference of their rates, over the body's largest moment"""
+    """torque between mantle and core per difference of their rates, over the body's largest moment"""
     angular_velocity: Triple[Rate] | None = Field(None, examples=[[0, 0, "13 deg/day"]])
-    """its angular velocity relative to space at the start, body axes; by default the body's"""
+    """angular velocity of the core relative to space at the start, body axes; by default the body's"""
 
 
 class Body(Solid):
@@ -254,9 +254,9 @@ class Body(Solid):
     surfaces: Annotated[list[SurfaceTable], Field(min_length=1)] | None = Field(
         None, examples=[[{"normal": [0, 0, 1], "area": "0.03 m^2", "specular": 0.2}]]
     )
-    """its outside as light and air meet it: plates, boxes and spheres, for radiation_pressure and drag"""
+    """the body's outside for radiation_pressure and drag: plates, boxes and spheres"""
     host: BodyName | None = Field(None, examples=["earth"])
-    """name of the point mass in [[bodies]] that this body is"""
+    """name of the point mass in [[bodies]] that is this body"""
     coupling: Literal["one_way", "full"] | None = None
     """whether [[bodies]] feel this body's shape: one_way (the default) or full"""
     center_of_mass: Triple[Metre] | None = Field(None, examples=[[0, 0, 0.5]])

@@ -52,11 +52,11 @@ class SurfaceTable(ConfigTable):
 
     rules = (_one_form,)
     normal: Direction | None = Field(None, examples=[[0, 0, 1]])
-    """of a plate: where its front looks, body axes, of any length"""
+    """of a plate: direction of its front, body axes, of any length"""
     area: Positive[Area] | None = Field(None, examples=["0.03 m^2"])
     """of a plate"""
     both_sides: StrictBool = False
-    """of a plate: whether its back is like its front; by default it has none"""
+    """of a plate: whether its back is like its front; by default the back feels nothing"""
     size: Triple[Positive[Metre]] | None = Field(None, examples=[["10 cm", "10 cm", "34 cm"]])
     """of a box: its edges along the body axes; six plates"""
     radius: Positive[Metre] | None = Field(None, examples=["30 cm"])
