@@ -37,36 +37,37 @@ STATES_READ = ("attitude", "vertical", "flight")
 
 
 class Load(SceneLoad):
-    """Base of all loads; as it stands it does nothing, and each class defines what it is more.
+    """Base of all loads; the base does nothing, and each class defines its methods.
 
-    A load of a user takes the state in SI (``rigidsim.model.si.InSI``) and gives SI: torques in N m,
+    A user-defined load takes the state in SI (``rigidsim.model.si.InSI``) and gives SI: torques in N m,
     potentials in J, powers in W. rigidsim's own loads are written in internal units.
 
     A load that carries angular momentum is a ``rigidsim.model.mechanics.Carrier``.
 
     Attributes:
         title: name used in reasons and messages.
-        remark: what readers should know of it besides its keys.
-        reads: states that it must find: "attitude", "vertical", "flight".
+        remark: further information for readers, in addition to the keys.
+        reads: states that the load needs: "attitude", "vertical", "flight".
         conservative: whether it has a potential that doesn't depend on time.
-        placement: how its source is placed.
-        orbit, table: what its source is on; all loads on one orbit or table share its states.
-        corotating_orbit: circular and in a fixed plane, in whose frame its potential rests: there is Jacobi's
-            constant.
-        plane: in which its source moves, or the body about its source, other than by an orbit or a point.
-        without_plane: why its source has an orbit, but no known plane; empty if it has one.
+        placement: how the source is placed.
+        orbit, table: of the source; all loads on one orbit or table share its states.
+        corotating_orbit: a circular orbit in a fixed plane, in whose frame the potential is constant, so that
+            Jacobi's constant exists.
+        plane: plane in which the source moves, or the body about the source, without an orbit or a point.
+        without_plane: why the source has an orbit, but no known plane; empty with a plane.
         has_source: whether ``source_direction`` is known; nadir, roll and libration count from it.
-        attracting_point: centre that its force always points to (mpf, m, space axes).
-        gradient_source: itself, if it is the gravity gradient of a distant body.
-        beside: the load that it acts beside, on the same source.
-        reacts: whether its source is one of the point masses besides the body, and feels ``reaction``.
-        seconds_ahead: by how much the time that it counts in is ahead of the scene's, which rounds it more.
-        of_time: whether it is a series, whose arguments are multiples of time.
-        wide: whether its expressions are too long to be unrolled (series of thousands of terms).
-        changes: what it does to the body's mass distribution, for what can't do with that; see ``shape``.
-        loose: of a carrier whose momentum isn't carried round with the body: ``exerted_torque`` is then all
-            that it exerts on the body, and -h' that less h x w.
-        unaveraged: why no average over the rotation takes it, and what to do with it instead.
+        attracting_point: centre to which the force always points (mpf, m, space axes).
+        gradient_source: the load itself, if it is the gravity gradient of a distant body.
+        beside: the main load with the same source, which this load supplements.
+        reacts: whether the source is one of the other point masses, and feels ``reaction``.
+        seconds_ahead: lead of the load's time over the scene's, which increases rounding.
+        of_time: whether the load is a series whose arguments are multiples of time.
+        wide: whether the expressions are too long to be unrolled (series of thousands of terms).
+        changes: description of a changed mass distribution, for refusals by features that need a constant
+            one; see ``shape``.
+        loose: whether a carrier doesn't turn with the body: ``exerted_torque`` is then its whole torque on
+            the body, and -h' is this torque less h x w.
+        unaveraged: why averages over the rotation refuse the load, and what to do instead.
     """
 
     title = "load"

@@ -53,11 +53,11 @@ def analyse(
         source: a dataset, a run, the path of one, or a trajectory of another tool (docs/compare.md). Lines
             are labelled with the frequencies of the scene that the dataset's attribute ``config`` describes.
         variables: names of variables, or of their signals (``obliquity.figure``, ``polar_motion.m1+im2``); by
-            default those that the scene is about.
+            default the main signals of the scene.
         lines: largest number of lines per signal.
         floor: lines below this share of a signal's strongest are left out.
         known: frequencies (rad/s) by name, in place of the scene's or if there is no scene.
-        window: order of the Hann window; by default what the lines' distances allow.
+        window: order of the Hann window; by default as the distances of lines allow.
 
     Returns:
         Frequencies (rad/s), amplitudes (the variable's unit) and phases (rad, at time zero) with errors and

@@ -47,7 +47,7 @@ def export(
         naming: epoch, axes and names that the run's config leaves open, for
             aem, oem, ck and pck; empty for sweeps.
         angle_unit: one of ``rigidsim.scene.readable.ANGLE_UNITS``; rad by default. For csv, parquet and zarr.
-        variables: names of those that are written; all by default. For the same formats.
+        variables: names of the variables to write; all by default. For the same formats.
         block_numbers: numbers of a sweep held in memory at once; no digit depends on it.
     """
     found = format_named(file_format)

@@ -284,12 +284,12 @@ def required_physics(
     told: Report = lambda _: None,
     tuning: Tuning | None = None,
 ) -> PhysicsPlan:
-    """Measure what each effect of a scene is worth, and find a least model within an error.
+    """Measure the size of each effect of a scene, and find a least model within an error.
 
     Args:
         experiment: as for ``rigidsim.run``.
         error: largest angle between the attitudes, such as ``"0.1 arcsec"``; a number is in rad.
-        out: the runs are kept in ``out/NAME-physics``; called again, it goes on with them.
+        out: the runs are kept in ``out/NAME-physics``; another call continues them.
         write: file for the least model's config.
         force: replace runs of another config, and the file.
         told: receives a line before each run.

@@ -102,8 +102,8 @@ def verify(
         path: its folder with a dataset, or a run's dataset alone.
         reversed: whether a run's motion is integrated to its end and back, too. A difference of more than ten
             times both ways' announced errors counts as a problem.
-        members: how many members of a sweep are run again, in other company than before, ``MEMBERS`` by
-            default; they are drawn anew each time unless a ``seed`` is given.
+        members: number of members of a sweep to run again, in other batches than before, ``MEMBERS`` by
+            default; they are drawn at random unless a ``seed`` is given.
         observer: receives the progress of a run's integration. report: lines on a fit's.
 
     Raises:

@@ -198,8 +198,8 @@ class Observable:
         units: SI.
         long_name: description for readers.
         frame: "body axes", "space axes" or "".
-        expressions: components as expressions of the state: of that in SI (``rigidsim.model.si.InSI``) for
-            units of a dimension without ``exponents``, otherwise of that in internal units (``Kinematics``).
+        expressions: components as expressions of the state: in SI (``rigidsim.model.si.InSI``) for units of a
+            dimension without ``exponents``, otherwise in internal units (``Kinematics``).
         exponents: binary exponents of the components' internal units; None where they are in SI or have none.
         needs: what the scene must have; names in ``rigidsim.model.observables.observable.NEEDS``.
         conserved: why it is an invariant of this scene, or None where it isn't.
@@ -209,7 +209,7 @@ class Observable:
         angles: the angles whose full turns are counted (``continuous_angles``), if it consists of such.
         poles: for Euler angles that are functions of the state, where only one of the outer ones is defined.
         attributes: further attributes of the variable: convention, reference plane, ...
-        absent: why this scene can't have it although it meets all needs; None if it can.
+        absent: why this scene can't have the observable although it meets all needs; None if it can.
     """
 
     name: str

@@ -23,8 +23,8 @@ class Effect:
     Attributes:
         registered: name under which ``register_effect`` registered it; empty for rigidsim's own.
         version: of its memory; a checkpoint with another is refused.
-        anywhere: whether it may be due within a stride, too.
-        rewrites: whether it writes the same motion in other states, rather than changing the motion.
+        anywhere: whether the effect may also be due within a stride.
+        rewrites: whether the effect expresses the same motion in other states, and doesn't change the motion.
     """
 
     registered: ClassVar[str] = ""
@@ -34,7 +34,7 @@ class Effect:
 
     @classmethod
     def of(cls, system: System, precision: Precision) -> Effect | None:
-        """If it is registered, the effect for a system; None where it does nothing."""
+        """The effect of a registered class for a system; None if the effect does nothing."""
         return cls()
 
     @property
@@ -44,7 +44,7 @@ class Effect:
 
     @property
     def limit(self) -> int:
-        """Largest length of a stride that it allows at present; it never grows on the way."""
+        """Largest length of a stride that the effect allows at present; it never grows during a run."""
         return sys.maxsize
 
     @property
@@ -66,7 +66,7 @@ class Effect:
 
     @property
     def memory(self) -> Any:
-        """All that its later applications depend on, as a value that stays as it is."""
+        """All that later applications depend on, as an immutable value."""
         return None
 
     def back_to(self, memory: Any, stepper: Stepper) -> None:

@@ -99,7 +99,7 @@ class Comparison(SummaryPart):
     Attributes:
         verdict: agrees, integration_error, wrong_model, inconsistent_rates or undecided.
         why: the verdict in words, with the numbers that it was given for.
-        within: rad, what attitudes may differ by and agree.
+        within: largest angle between attitudes that agree, rad.
         resolution: rad, of the trajectory's attitudes by the digits that they are written in.
         rate_error: largest difference of angular velocities, rad/s; None without rates.
         position_error: the same of positions, m.
@@ -193,13 +193,13 @@ def compare(
         experiment: as for ``rigidsim.run``.
         table: a file (CSV, Parquet, netCDF, AEM), a run or its folder, a mapping of names to arrays,
             a pandas DataFrame, or an xarray Dataset. Columns are known by their names (docs/compare.md).
-        within: rad, what attitudes may differ by and agree.
-        convention: what is known of it, such as ``{"order": "xyzw", "rate_axes": "space"}``; the rest is
-            found.
+        within: largest angle between attitudes that agree, rad.
+        convention: known parts of the file's convention, such as ``{"order": "xyzw", "rate_axes": "space"}``;
+            the rest is found.
         out: file for the dataset. figure: file for the figure, a .png or .svg.
         timeline: file for a timeline (.rrd) of both bodies with the angle between them.
-        kernels: SPICE's, that a CK is read with: its clock, and leap seconds.
-        force: replace existing files; what is read is never written over.
+        kernels: of SPICE, for reading a CK: clock and leap seconds.
+        force: replace existing files; files that are read are never replaced.
 
     Raises:
         ConfigError: the config can't be run.

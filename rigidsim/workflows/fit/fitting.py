@@ -544,8 +544,8 @@ def fit(
     """Estimate the parameters of a config's ``[fit]`` from its data.
 
     Args:
-        experiment: as for ``rigidsim.run``; data files lie next to the config, or in the working directory
-            where it comes from no file.
+        experiment: as for ``rigidsim.run``; data files lie next to the config, or in the working directory if
+            the config comes from no file.
         changes: values to replace, as for ``rigidsim.run``.
         out: folder of the fits' folders, where ``out/NAME/`` keeps everything; None: nothing is written.
         force: replace a fit of the same name.
@@ -556,7 +556,7 @@ def fit(
 
     Raises:
         ConfigError: the config has no [fit], or one that can't be used.
-        RigidsimError: data can't be used, or the motion can't be computed where the fit starts.
+        RigidsimError: data can't be used, or the motion can't be computed at the fit's start.
         RunFolderError: a finished fit, or something else, is in the folder.
     """
     asked = as_experiment(experiment, changes)
