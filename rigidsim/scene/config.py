@@ -321,14 +321,16 @@ def _table_sections(config: Config, folder: Path) -> str:
         orbit = getattr(one, "elements", None)
         if orbit is not None and orbit.table is not None:
             named.append((f"[[loads]] number {number} {orbit.key}.table", orbit.table, _whole))
-    parts = ((f"parts[{number}].", part) for number, part in enumerate(config.body.parts or []))
-    for place, solid in (("", config.body), *parts):
-        if solid.file is not None:
-            named.append((f"[body] {place}file", solid.file, _mesh if is_mesh(solid.file) else _whole))
-    field = config.body.gravity_field
-    if field is not None and field.file is not None:
-        degree = asked_degree(field, config.loads, config.sweep)
-        named.append(("[body] gravity_field file", field.file, partial(cut, degree=degree)))
+    others = ((f"[[rigid_bodies]] number {n}", table) for n, table in enumerate(config.rigid_bodies, 1))
+    for where, body in (("[body]", config.body), *others):
+        parts = ((f"parts[{number}].", part) for number, part in enumerate(body.parts or []))
+        for place, solid in (("", body), *parts):
+            if solid.file is not None:
+                named.append((f"{where} {place}file", solid.file, _mesh if is_mesh(solid.file) else _whole))
+        field = body.gravity_field
+        if field is not None and field.file is not None:
+            degree = asked_degree(field, config.loads, config.sweep)
+            named.append((f"{where} gravity_field file", field.file, partial(cut, degree=degree)))
     found: dict[str, str] = {}
     for where, name, read in named:
         if name not in found and name not in config.tables:

@@ -16,7 +16,7 @@ from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import Exactly, InUnit, Range
 from rigidsim.scene.validation_messages import nearest, shown
 
-ARRAYS_OF_TABLES = ("loads", "bodies", "rotors", "states", "events", "fit.data")
+ARRAYS_OF_TABLES = ("loads", "bodies", "rigid_bodies", "rotors", "states", "events", "fit.data")
 _TABLES = (
     "body", "initial", "ephemeris", "frame", "time", "model", "integrator", "output", "limits", "parameters",
     "sweep", "fit", "tables", "tides",

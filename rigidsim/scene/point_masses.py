@@ -245,13 +245,14 @@ def _place(
     what = f'given "{about}", which goes about this body itself'
     ensure(centre not in asking, _fault(number, "orbit.about", what))
     around = _place(centre, tables, names, strengths, context, places, (*asking, number))
-    own = _of_elements(table.orbit, strengths[centre] + strengths[number], context)
+    own = start_of_elements(table.orbit, strengths[centre] + strengths[number], context)
     places[number] = plus(around[0], own[0]), plus(around[1], own[1])
     return places[number]
 
 
-def _of_elements(orbit: StartingOrbit, strength: Any, context: Any) -> tuple[Vector, Vector]:
-    """Relative position and velocity."""
+def start_of_elements(orbit: Ellipse, strength: Any, context: Any) -> tuple[Vector, Vector]:
+    """Relative position and velocity, from a sum of gravitational parameters."""
+    assert orbit.semi_major_axis is not None
     a, e = orbit.semi_major_axis.at(context), orbit.eccentricity.at(context)
     anomaly = eccentric_anomaly(context, orbit.mean_anomaly.at(context), e)
     c, s, root = context.cos(anomaly), context.sin(anomaly), context.sqrt(1 - e * e)

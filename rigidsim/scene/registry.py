@@ -270,6 +270,11 @@ OBSERVABLES: dict[str, Any] = {}
 """What can be recorded, by name, in the order in which a dataset holds it."""
 
 
+def one_of(table: str) -> str:
+    """What a single table of an array is called: rotor for ``rotors``."""
+    return f"{table[:-3]}y" if table.endswith("ies") else table[:-1]
+
+
 def register_class(known: dict[str, Any], name: str, kind: type, what: str) -> None:
     """Put a class into a registry. The same class defined anew, as in a notebook, replaces its older self.
 

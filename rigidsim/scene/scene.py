@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.scene import starts, units
 from rigidsim.scene.arithmetic import Matrix, Vector, context_for, cross, diagonal, dot, eigen
-from rigidsim.scene.bodies.body import RigidBody, build_body, field_of_mesh, inverse_inertia
+from rigidsim.scene.bodies.body import Body, RigidBody, build_body, field_of_mesh, inverse_inertia
 from rigidsim.scene.bodies.gravity_field import asked_degree, gravity_field_of
 from rigidsim.scene.bodies.outside import surfaces_of, with_surfaces
 from rigidsim.scene.config import Experiment
@@ -299,12 +299,18 @@ def _orientation(setting: Setting, source: str) -> Orientation | None:
 
 def _body_at_start(config: Config, context: Any) -> RigidBody:
     moments = moments_at_start(config, context, config.time.start.at(context))
-    body = build_body(config.body, context, config.integrator.euler_sequence, moments, config.texts)
+    body = whole_body(config.body, config, context, moments)
     outside = surfaces_of(config.body.surfaces, body.center_of_mass, context)
     if outside:
         drawing = with_surfaces(body.drawing, config.body.surfaces, outside)
         body = replace(body, surfaces=outside, drawing=drawing)
-    field = config.body.gravity_field or field_of_mesh(config.body, config.texts)
+    return body
+
+
+def whole_body(table: Body, config: Config, context: Any, moments: Vector | None = None) -> RigidBody:
+    """A body of a config with its gravity field; ``moments`` as for ``build_body``."""
+    body = build_body(table, context, config.integrator.euler_sequence, moments, config.texts)
+    field = table.gravity_field or field_of_mesh(table, config.texts)
     if field is None:
         return body
     degree = asked_degree(field, config.loads)

@@ -30,7 +30,7 @@ from pydantic import (
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import units
-from rigidsim.scene.bodies.body import Body
+from rigidsim.scene.bodies.body import Body, Matter
 from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.scene.choices import AUTO, DEFAULT_METHOD, FORMULATIONS, METHODS, ORBIT_AVERAGED, REDUCED
 from rigidsim.scene.exact import ZERO, ExactNumber, parse_number
@@ -70,6 +70,7 @@ from rigidsim.scene.fields import (
     refuse,
 )
 from rigidsim.scene.frame import Frame
+from rigidsim.scene.kepler import Ellipse
 from rigidsim.scene.kernels.ephemeris import EphemerisTable
 from rigidsim.scene.paths import ARRAYS_OF_TABLES, Path
 from rigidsim.scene.point_masses import PointMassBody
@@ -90,22 +91,31 @@ EQUILIBRIUM_NAMES = ("relative", "cassini_1", "cassini_2", "cassini_3", "cassini
 _NOT_ZERO = Range(lambda x: x != 0, "any other time, a negative one for retrograde,")
 
 
-class Initial(ConfigTable):
-    """``[initial]``: the state at ``time.start``."""
+class Motion(ConfigTable):
+    """How a body moves at ``time.start``."""
 
-    rules = (excludes("tle", "position", "velocity", "frame"),)
     angular_velocity: Triple[Rate] | None = Field(
         None, examples=[[0.1, 1.0, 0.05], ["0 deg/s", "0 deg/s", "20 deg/h"]]
     )
     """angular velocity relative to space or to relative_to, in body axes; this or angular_momentum"""
-    angular_momentum: Triple[Momentum] | None = Field(None, examples=[[0, 0, 12.5]])
-    """angular momentum in space axes, instead of angular_velocity"""
     quaternion: Annotated[Four[Dimensionless], NotZero] | None = Field(None, examples=[[1, 0, 0, 0]])
     """attitude w, x, y, z: takes body axes to space axes (or those of relative_to); any norm but zero; by
     default the body axes start along these
     """
     euler_angles: Triple[Angle] | None = Field(None, examples=[["10 deg", "23.44 deg", "0 deg"]])
     """phi, theta, psi of [integrator] euler_sequence, intrinsic; instead of quaternion"""
+    position: Triple[Metre] | None = Field(None, examples=[["7000 km", 0, 0]])
+    """position of the centre of mass, in space axes; with it or velocity the body flies freely"""
+    velocity: Triple[Speed] | None = Field(None, examples=[[0, "7.5 km/s", 0]])
+    """velocity of the centre of mass, in space axes"""
+
+
+class Initial(Motion):
+    """``[initial]``: the state at ``time.start``."""
+
+    rules = (excludes("tle", "position", "velocity", "frame"),)
+    angular_momentum: Triple[Momentum] | None = Field(None, examples=[[0, 0, 12.5]])
+    """angular momentum in space axes, instead of angular_velocity"""
     pole: Pair[Angle] | None = Field(None, examples=[["317.68 deg", "52.89 deg"]])
     """right ascension and declination (J2000) of the figure axis; instead of quaternion; needs [frame] axes
     """
@@ -132,10 +142,6 @@ class Initial(ConfigTable):
     forward, y against the orbit's normal, z to the source), rsw, rtn or ric (outward, forward, normal), ned
     (north, east, to the source)
     """
-    position: Triple[Metre] | None = Field(None, examples=[["7000 km", 0, 0]])
-    """position of the centre of mass, in space axes; with it or velocity the body flies freely"""
-    velocity: Triple[Speed] | None = Field(None, examples=[[0, "7.5 km/s", 0]])
-    """velocity of the centre of mass, in space axes"""
     tle: ElementLines | None = Field(
         None,
         examples=[
@@ -602,6 +608,26 @@ class RotorTable(ConfigTable):
     """a motor keeps the rate, with any torque needed"""
 
 
+class RelativeOrbit(Ellipse):
+    """Osculating elements of a body about ``[body]`` at the start, of both as points."""
+
+    semi_major_axis: Positive[Metre] = Field(examples=["1190 m"])
+    """semi-major axis of the ellipse"""
+
+
+class RigidBodyTable(Matter, Motion):
+    """``[[rigid_bodies]]``: a second body, with keys of ``[body]`` and ``[initial]``; its position and
+    velocity count from the centre of mass of ``[body]``.
+    """
+
+    rules = (excludes("orbit", "position", "velocity"),)
+
+    name: VariableName = Field(examples=["dimorphos"])
+    """letters, digits and underscores, beginning with a letter; its label in the dataset"""
+    orbit: RelativeOrbit | None = Field(None, examples=[{"semi_major_axis": "1190 m", "eccentricity": 0.02}])
+    """osculating elements about [body] at the start, instead of position and velocity"""
+
+
 _NUMBER = ("", "1")
 """Units of a pure number."""
 
@@ -666,6 +692,8 @@ class Config(ConfigTable):
     """the kernel that places real bodies: sources of loads given by name, and the body itself"""
     bodies: list[PointMassBody] = Field(default_factory=list, max_length=64)
     """point masses under mutual gravity, integrated with the body"""
+    rigid_bodies: list[RigidBodyTable] = Field(default_factory=list, max_length=1)
+    """a second rigid body, integrated with [body]; kind = "mutual_gravity" of [[loads]] binds them"""
     rotors: list[RotorTable] = Field(default_factory=list, max_length=64)
     """wheels in the body, free, driven or at fixed rates"""
     states: list[OwnStateTable] = Field(default_factory=list, max_length=64)
@@ -734,7 +762,7 @@ class Config(ConfigTable):
         }
         return self.model_copy(update=tables)
 
-    @field_validator("loads", "events", "bodies", "rotors", "states")
+    @field_validator("loads", "events", "bodies", "rigid_bodies", "rotors", "states")
     @classmethod
     def _different(cls, value: list[Any], info: ValidationInfo) -> list[Any]:
         names = [table.name for table in value]

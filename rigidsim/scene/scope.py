@@ -107,14 +107,6 @@ OUT_OF_SCOPE = (
         "a kernel, and give their orbit as [ephemeris] or as a table of elements",
     ),
     OutOfScope(
-        "a second rigid body isn't modelled",
-        (
-            "binary", "full_two_body", "f2bp", "secondary", "mutual_potential",
-        ),
-        "one of them turns, and its partner is a point mass ([[bodies]] with coupling) or has a "
-        "figure (J2); irregular bodies are [body] gravity_field",
-    ),
-    OutOfScope(
         "heat isn't modelled",
         (
             "thermal", "temperature", "yarkovsky", "yorp", "heat", "thermal_expansion", "conduction",
@@ -142,6 +134,9 @@ OUT_OF_SCOPE = (
 
 
 NAMED_OTHERWISE = {
+    "a second rigid body is one of [[rigid_bodies]], under mutual_gravity (docs/two_bodies.md)": (
+        "binary", "full_two_body", "f2bp", "secondary", "mutual_potential", "second_body",
+    ),
     "a wheel is one of [[rotors]] (docs/rotors.md)": (
         "reaction_wheel", "momentum_wheel", "wheel", "flywheel", "rotor", "gyrostat", "gyroscope",
         "momentum_bias", "dual_spin", "momentum_exchange",

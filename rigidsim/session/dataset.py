@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.loads.inner_bodies import rotors_of
 from rigidsim.model.orbits import sights_of
 from rigidsim.model.system import Invariant
 from rigidsim.scene.kernels.ephemeris import date_of
@@ -100,8 +99,10 @@ def published_of(prepared: InitialValueProblem) -> "PublishedAttitude | None":
 def labels_of_the_run(scene: Scene) -> dict[str, Sequence[str]]:
     """Labels of the dimensions ``OF_THE_RUN``."""
     bodies = () if scene.bodies is None else scene.bodies.names
-    rotors, sources = [rotor.name for rotor in rotors_of(scene)], sights_of(scene)
-    return {"point_mass": bodies, "rotor": rotors, "source": [sight.source for sight in sources]}
+    sights, tables = sights_of(scene), (scene.config.rotors, scene.config.rigid_bodies)
+    rotors, others = ([one.name for one in table] for table in tables)
+    sources = [sight.source for sight in sights]
+    return {"point_mass": bodies, "rotor": rotors, "rigid_body": others, "source": sources}
 
 
 def recorded_variables(prepared: InitialValueProblem) -> list[Variable]:

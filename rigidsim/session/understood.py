@@ -23,7 +23,7 @@ from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import ConfigTable
 from rigidsim.scene.readable import TimeWords, length_text, number_text
-from rigidsim.scene.registry import LOADS
+from rigidsim.scene.registry import LOADS, one_of
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.swept import plain
@@ -96,7 +96,7 @@ def load_descriptions(prepared: InitialValueProblem, *, sizes: bool = True) -> t
     rows: list[tuple[str, Any, Any]] = [(getattr(x, "kind", ""), x, load) for x, load in pairs]
     for table, found in scene.tabled.items():
         pairs = zip(getattr(scene.config, table), found, strict=True)
-        rows += [(table[:-1], fields, load) for fields, load in pairs]
+        rows += [(one_of(table).replace("_", " "), fields, load) for fields, load in pairs]
     for key, kind in LOADS["body"].items():
         rows += [
             (key, getattr(scene.config.body, key), load) for load in scene.loads if isinstance(load, kind)

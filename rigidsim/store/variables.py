@@ -24,9 +24,9 @@ LABELS: dict[str, list[str]] = {
 }
 """Coordinates besides time, with their labels."""
 
-OF_THE_RUN = ("point_mass", "rotor", "source", "parameter")
-"""Coordinates whose labels depend on the run: names of ``[[bodies]]``, ``[[rotors]]``, of bodies of a kernel
-that loads see, and the keys of sensitivities.
+OF_THE_RUN = ("point_mass", "rotor", "rigid_body", "source", "parameter")
+"""Coordinates whose labels depend on the run: names of ``[[bodies]]``, ``[[rotors]]``,
+``[[rigid_bodies]]``, of bodies of a kernel that loads see, and the keys of sensitivities.
 """
 
 SCHEMA_VERSION = 4

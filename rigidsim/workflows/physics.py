@@ -28,7 +28,7 @@ from rigidsim.scene.choices import FULL, REDUCED
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import parse_number
 from rigidsim.scene.readable import span_text
-from rigidsim.scene.registry import LOADS, EffectPart, names_of
+from rigidsim.scene.registry import LOADS, EffectPart, names_of, one_of
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.swept import plain
@@ -42,7 +42,10 @@ from rigidsim.store.summary import Summary, SummaryPart
 from rigidsim.workflows.read import Given, as_experiment
 from rigidsim.workflows.run import resume, run
 
-_TITLES = {"loads": "", "rotors": "rotor ", "bodies": "attraction by the point mass "}
+_TITLES = {
+    "loads": "", "rotors": "rotor ", "rigid_bodies": "rigid body ",
+    "bodies": "attraction by the point mass ",
+}  # fmt: skip
 """What tables of arrays are called before their names."""
 
 
@@ -112,7 +115,7 @@ def _all(config: Config) -> Iterator[PhysicalEffect]:
     for array in ("bodies", *LOADS["table"]):
         for n, table in enumerate(getattr(config, array)):
             words = f"{_TITLES.get(array, '')}{table.name}"
-            yield PhysicalEffect(f"{array[:-1]}-{table.name}", words, gone=(array, n))
+            yield PhysicalEffect(f"{one_of(array)}-{table.name}", words, gone=(array, n))
         if array in LOADS["table"] and not getattr(config, array):
             yield PhysicalEffect(array, array, missing=f"the config has no [[{array}]]")
     if {fields.kind for fields in config.loads} < set(LOADS["kind"]):  # type: ignore[attr-defined]

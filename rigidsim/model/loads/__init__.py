@@ -10,6 +10,7 @@ from rigidsim.model.loads import (  # noqa: F401  (each enters its kinds; a new 
     gravity,
     inner_bodies,
     magnetic_field,
+    rigid_bodies,
     surface_load,
 )
 from rigidsim.model.si import InSI, in_si, seconds

@@ -515,9 +515,9 @@ class BodyField(ByPlacedSource):
 
     @classmethod
     def beside_of(cls, load: Any, fields: Any, around: Setting) -> Load | None:
-        degree, field, placement = fields.degree, around.body.gravity, load.placement
-        if degree < LEAST:
+        if fields.degree < LEAST or not isinstance(load, Attraction):
             return None
+        degree, field, placement = fields.degree, around.body.gravity, load.placement
         if field is None:
             what = "[body] has no gravity_field; give it, or leave degree out (the inertia tensor "
             raise around.fault("degree", f"given {degree}, but {what}is degree 2)")

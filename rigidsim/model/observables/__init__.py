@@ -31,6 +31,7 @@ from rigidsim.model.observables.observable import (
 from rigidsim.model.observables.observable import (
     register_all,
 )
+from rigidsim.model.observables.pair import PAIR
 
-register_all(*MECHANICAL, *AXES, *ROTATION, *POLE, *ORBIT, *TOP, *POINT_MASSES, *PARTS, *CLIMATE)
+register_all(*MECHANICAL, *AXES, *ROTATION, *POLE, *ORBIT, *TOP, *POINT_MASSES, *PARTS, *PAIR, *CLIMATE)
 register_all(RESONANT_ANGLE, *TOPS, *WATCHED)

@@ -36,6 +36,7 @@ from rigidsim.scene.arithmetic import (
     eigen,
     minus,
     multiply,
+    plus,
     transpose,
     vector,
 )
@@ -43,7 +44,7 @@ from rigidsim.scene.bodies.files import is_mesh, link_inertia, mesh_moments
 from rigidsim.scene.bodies.gravity_field import GravityField, GravityFieldTable
 from rigidsim.scene.bodies.outside import OuterSurface, SurfaceTable
 from rigidsim.scene.bodies.presets import PRESETS, Preset
-from rigidsim.scene.bodies.shapes import DIMENSIONS, SHAPES
+from rigidsim.scene.bodies.shapes import DIMENSIONS, SHAPES, Points
 from rigidsim.scene.exact import ZERO, ExactNumber, exact_decimal, parse_number
 from rigidsim.scene.fields import (
     NAME_OR_VECTOR,
@@ -216,8 +217,8 @@ class Core(ConfigTable):
     """angular velocity of the core relative to space at the start, body axes; by default the body's"""
 
 
-class Body(Solid):
-    """``[body]``: exactly one source of inertia, and what loads need in addition."""
+class Matter(Solid):
+    """What a body is: exactly one source of inertia, its mass, and its gravity."""
 
     principal_moments: Triple[MomentOrFormula] | None = Field(
         None, examples=[[1, 2, 2.5], [1, 2, "2 + 0.1*sin(t)"]]
@@ -237,6 +238,17 @@ class Body(Solid):
     """solids that make up the body"""
     preset: Annotated[str, OneOf(PRESETS)] | None = None
     """name of a published body"""
+    mass: Positive[Kilogram] | None = Field(None, examples=[12])
+    """mass of the body; required for shapes, and wherever a load or the translational motion uses it"""
+    gravity_field: GravityFieldTable | None = Field(
+        None, examples=[{"radius": "1738 km", "C": {"3,0": -8.4e-6, "3,1": 2.8e-5}, "S": {"3,1": 5.9e-6}}]
+    )
+    """the body's gravity beyond the inertia tensor, from degree 3 on, for loads that ask for it by degree"""
+
+
+class Body(Matter):
+    """``[body]``: exactly one source of inertia, and what loads need in addition."""
+
     dynamical_ellipticity: Annotated[Dimensionless, within("0", "0.5")] | None = Field(
         None, examples=["0.0032672658"]
     )
@@ -245,12 +257,6 @@ class Body(Solid):
     """a fluid core within the body"""
     elasticity: ElasticityTable | None = Field(None, examples=[{"love_number": 0.0216, "radius": "1738 km"}])
     """tides and spin distort the tensor of inertia"""
-    mass: Positive[Kilogram] | None = Field(None, examples=[12])
-    """mass of the body; required for shapes, and wherever a load or the translational motion uses it"""
-    gravity_field: GravityFieldTable | None = Field(
-        None, examples=[{"radius": "1738 km", "C": {"3,0": -8.4e-6, "3,1": 2.8e-5}, "S": {"3,1": 5.9e-6}}]
-    )
-    """the body's gravity beyond the inertia tensor, from degree 3 on, for loads that ask for it by degree"""
     surfaces: Annotated[list[SurfaceTable], Field(min_length=1)] | None = Field(
         None, examples=[[{"normal": [0, 0, 1], "area": "0.03 m^2", "specular": 0.2}]]
     )
@@ -304,6 +310,7 @@ class RigidBody:
         source: key that the inertia came from, with the preset's reference if there is one.
         gravity: its gravity beyond the inertia tensor; None if the config gives none.
         surfaces: its outside, as light and air meet it.
+        points: masses and places, body axes, with its moments to degree 5; None where these are unknown.
         reference: the reference point in the coordinates of the description; None without pieces.
     """
 
@@ -316,6 +323,7 @@ class RigidBody:
     drawing: list[dict[str, Any]] = field(default_factory=list)
     gravity: GravityField | None = None
     surfaces: tuple[OuterSurface, ...] = ()
+    points: Points | None = None
     reference: Vector | None = None
 
 
@@ -329,6 +337,7 @@ class _Piece:
     position: Vector
     inertia: Matrix
     drawing: dict[str, Any]
+    points: Points | None = None  # shares of its mass, from its position
 
 
 def refusal(key: str, text: str) -> ConfigError:
@@ -428,7 +437,8 @@ def _from_pieces(table: Body, source: str, maker: _Pieces, preset: Preset | None
     else:
         zero, point = diagonal([context.zero] * 3), {"solid": "point"}
         given = [(one.mass.at(context), vector(context, one.position)) for one in table.points or []]
-        pieces = [_Piece(mass, position, zero, point) for mass, position in given]
+        alone = [(context.one, [context.zero] * 3)]
+        pieces = [_Piece(mass, position, zero, point, alone) for mass, position in given]
     total = sum((piece.mass for piece in pieces), context.zero)
     if preset and table.mass is not None:
         mass = table.mass.at(context)
@@ -440,15 +450,18 @@ def _from_pieces(table: Body, source: str, maker: _Pieces, preset: Preset | None
     reference = _reference_point(table, source, center, context)
     inertia = diagonal([context.zero] * 3)
     drawing = []
+    points: Points = []
     for piece in pieces:
         arm = minus(piece.position, reference)
+        points += ((piece.mass * share, plus(arm, place)) for share, place in piece.points or ())
         own = _moved(piece.inertia, piece.mass, arm)
         inertia = [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(inertia, own, strict=True)]
         drawing.append({**piece.drawing, "position": [float(plain(x)) for x in arm]})
         if piece.drawing["solid"] == "point":
             drawing[-1]["dimensions"] = {"mass_fraction": float(plain(piece.mass / total))}
     body = _finish(context, table, named, total, minus(center, reference), inertia, drawing)
-    return replace(body, reference=reference)
+    known = all(piece.points is not None for piece in pieces)
+    return replace(body, reference=reference, points=points if known else None)
 
 
 def _moved(inertia: Matrix, mass: Any, arm: Vector) -> Matrix:
@@ -500,6 +513,7 @@ class _Pieces:
             turn = attitude.rotation_matrix(turned[0])
             piece.inertia = multiply(multiply(turn, piece.inertia), transpose(turn))
             piece.position = apply(turn, piece.position)
+            piece.points = piece.points and [(share, apply(turn, x)) for share, x in piece.points]
             whole = attitude.product([float(plain(x)) for x in turned[0]], piece.drawing["quaternion"])
             piece.drawing["quaternion"] = whole
         piece.position = [x + p for x, p in zip(piece.position, origin, strict=True)]
@@ -538,7 +552,8 @@ class _Pieces:
         plainly = {k: [float(plain(x)) for x in v] for k, v in dimensions.items()}
         sizes = {k: (v if shape.dimensions[k] > 1 else v[0]) for k, v in plainly.items()}
         origin = [context.zero] * 3
-        return _Piece(mass, origin, inertia, _drawn(name, sizes, origin))
+        points = None if shape.points is None else shape.points(context, dimensions)
+        return _Piece(mass, origin, inertia, _drawn(name, sizes, origin), points)
 
     def _of_tensor(self, part: Part, place: str) -> _Piece:
         context, mass, center = (

@@ -2,6 +2,11 @@
 
 Formulas: Landau & Lifshitz, Mechanics, section 32, and standard tables; checked in the tests against
 numerical integration over the volume. All are evaluated in mpmath at the caller's precision.
+
+Moments of higher degree come from a few points with the same integrals of all polynomials to degree 5:
+Gauss's three on a line, his two in the square of the radius times a hexagon on a disk, and in a ball its
+centre and the corners of an icosahedron at the radius sqrt(5/7) (Stroud, Approximate Calculation of Multiple
+Integrals, 1971).
 """
 
 from __future__ import annotations
@@ -69,6 +74,8 @@ def polygon(*corners: tuple[float, float]) -> Revolved:
 
 Dimensions = Mapping[str, list[Any]]
 Vector = list[Any]
+Points = list[tuple[Any, Vector]]
+"""Shares of the mass, and their places."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +89,7 @@ class Shape:
         outline: dimensions as float -> outline.
         landmarks: named points that a body can turn about, from the centre of mass, metres.
         at_most: two dimensions, the first of which is at most the second.
+        points: (context, dimensions) -> points of the same moments to degree 5; None if unknown.
     """
 
     dimensions: Mapping[str, int]
@@ -90,6 +98,51 @@ class Shape:
     outline: Callable[[Dimensions], Outline]
     landmarks: Mapping[str, Callable[[Any, Dimensions], Vector]] = field(default_factory=dict)
     at_most: tuple[str, str] | None = None
+    points: Callable[[Any, Dimensions], Points] | None = None
+
+
+def _crossed(*factors: Points) -> Points:
+    """Points whose coordinates are the factors' in order."""
+    found: Points = [(1, [])]
+    for factor in factors:
+        found = [(w * v, [*x, *y]) for w, x in found for v, y in factor]
+    return found
+
+
+def _line(c: Any, length: Any) -> Points:
+    end = c.sqrt(c.mpf(3) / 5) * length / 2
+    return [(c.mpf(5) / 18, [-end]), (c.mpf(4) / 9, [c.zero]), (c.mpf(5) / 18, [end])]
+
+
+def _hexagons(c: Any, squares: Vector) -> Points:
+    corners = [(c.cos(k * c.pi / 3), c.sin(k * c.pi / 3)) for k in range(6)]
+    share = c.one / (6 * len(squares))
+    return [(share, [c.sqrt(s) * x, c.sqrt(s) * y]) for s in squares for x, y in corners]
+
+
+def _annulus(c: Any, inner: Any, outer: Any) -> Points:
+    middle, half = (inner**2 + outer**2) / 2, (outer**2 - inner**2) / 2
+    return _hexagons(c, [middle - half / c.sqrt(3), middle + half / c.sqrt(3)])
+
+
+def _icosahedron(c: Any, axes: Vector) -> Points:
+    golden, found = (1 + c.sqrt(5)) / 2, []
+    size = c.sqrt(1 + golden**2)
+    for k in range(3):
+        for x in (1, -1):
+            for y in (golden, -golden):
+                corner = [c.zero, x / size, y / size]
+                found.append((c.one / 12, [a * corner[(i + k) % 3] for i, a in enumerate(axes)]))
+    return found
+
+
+def _ball(c: Any, axes: Vector) -> Points:
+    radius = c.sqrt(c.mpf(5) / 7)
+    outer = [(w * 21 / 25, x) for w, x in _icosahedron(c, [radius * a for a in axes])]
+    return [(c.mpf(4) / 25, [c.zero] * 3), *outer]
+
+
+_FLAT: Points = [(1, [0])]
 
 
 def _boxed(d: Dimensions, key: str, part: int) -> Vector:
@@ -149,6 +202,7 @@ SHAPES: dict[str, Shape] = {
         lambda _, d: _boxed(d, "size", 12),
         lambda d: Box(*d["size"]),
         {"corner": lambda _, d: [-x / 2 for x in d["size"]]},
+        points=lambda c, d: _crossed(*(_line(c, x) for x in d["size"])),
     ),
     "plate": Shape(
         {"size": 2},
@@ -156,30 +210,35 @@ SHAPES: dict[str, Shape] = {
         lambda _, d: _plate(d),
         lambda d: Box(d["size"][0], d["size"][1], THINNESS * max(d["size"])),
         {"corner": lambda c, d: [-x / 2 for x in d["size"]] + [c.zero]},
+        points=lambda c, d: _crossed(*(_line(c, x) for x in d["size"]), _FLAT),
     ),
     "ellipsoid": Shape(
         {"semi_axes": 3},
         "semi-axes along x, y, z",
         lambda _, d: _boxed(d, "semi_axes", 5),
         lambda d: Ellipsoid(*d["semi_axes"]),
+        points=lambda c, d: _ball(c, d["semi_axes"]),
     ),
     "sphere": Shape(
         {"radius": 1},
         "solid ball",
         lambda _, d: [2 * d["radius"][0] ** 2 / 5] * 3,
         lambda d: Ellipsoid(*d["radius"] * 3),
+        points=lambda c, d: _ball(c, d["radius"] * 3),
     ),
     "spherical_shell": Shape(
         {"radius": 1},
         "thin hollow ball",
         lambda _, d: [2 * d["radius"][0] ** 2 / 3] * 3,
         lambda d: Ellipsoid(*d["radius"] * 3),
+        points=lambda c, d: _icosahedron(c, d["radius"] * 3),
     ),
     "cylinder": Shape(
         {"radius": 1, "height": 1},
         "axis along z",
         lambda _, d: _round(d["radius"][0] ** 2, d["height"][0]),
         lambda d: _upright(*d["radius"], *d["height"]),
+        points=lambda c, d: _crossed(_annulus(c, c.zero, d["radius"][0]), _line(c, d["height"][0])),
     ),
     "tube": Shape(
         {"inner_radius": 1, "outer_radius": 1, "height": 1},
@@ -187,6 +246,9 @@ SHAPES: dict[str, Shape] = {
         lambda _, d: _round(d["inner_radius"][0] ** 2 + d["outer_radius"][0] ** 2, d["height"][0]),
         _drawn_tube,
         at_most=("inner_radius", "outer_radius"),
+        points=lambda c, d: _crossed(
+            _annulus(c, d["inner_radius"][0], d["outer_radius"][0]), _line(c, d["height"][0])
+        ),
     ),
     "cone": Shape(
         {"radius": 1, "height": 1},
@@ -201,18 +263,21 @@ SHAPES: dict[str, Shape] = {
         lambda c, d: [d["length"][0] ** 2 / 12] * 2 + [c.zero],
         lambda d: _upright(THINNESS * d["length"][0], d["length"][0]),
         {"end": lambda c, d: [c.zero, c.zero, -d["length"][0] / 2]},
+        points=lambda c, d: _crossed(_FLAT, _FLAT, _line(c, d["length"][0])),
     ),
     "disk": Shape(
         {"radius": 1},
         "thin, normal along z",
         lambda _, d: _flat(d["radius"][0] ** 2, 2),
         lambda d: _upright(d["radius"][0], 2 * THINNESS * d["radius"][0]),
+        points=lambda c, d: _crossed(_annulus(c, c.zero, d["radius"][0]), _FLAT),
     ),
     "ring": Shape(
         {"radius": 1},
         "thin hoop, normal along z",
         lambda _, d: _flat(d["radius"][0] ** 2, 1),
         lambda d: _drawn_torus(d["radius"][0], 2 * THINNESS * d["radius"][0]),
+        points=lambda c, d: _crossed(_hexagons(c, [d["radius"][0] ** 2]), _FLAT),
     ),
     "torus": Shape(
         {"major_radius": 1, "minor_radius": 1},

@@ -1,0 +1,349 @@
+"""Two rigid bodies under mutual gravity against sums over pairs of points, written from the definitions."""
+
+import itertools
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+from equations import Random, derivative, matrix, observed
+from support import config, loaded, run_text, same_bits, seeds, wide
+
+import rigidsim
+from rigidsim.solve.problem import prepare
+
+G = 6.6743e-11
+MASS = 1 / G  # kg, of order one in units of G
+
+
+@dataclass
+class Points:
+    """A rigid body of particles about its centre of mass."""
+
+    masses: np.ndarray
+    places: np.ndarray
+
+    @property
+    def mass(self) -> float:
+        return float(self.masses.sum())
+
+    @property
+    def inertia(self) -> np.ndarray:
+        return sum(
+            m * (x @ x * np.eye(3) - np.outer(x, x)) for m, x in zip(self.masses, self.places, strict=True)
+        )
+
+    @property
+    def keys(self) -> str:
+        each = [f"{{mass = {float(m)!r}, position = {x.tolist()}}}" for m, x in
+                zip(self.masses, self.places, strict=True)]  # fmt: skip
+        return f"points = [{', '.join(each)}]"
+
+    @classmethod
+    def drawn(cls, random: Random, count: int = 5) -> "Points":
+        masses = MASS * random.generator.uniform(0.1, 1, count)
+        places = random.generator.uniform(-0.3, 0.3, (count, 3))
+        return cls(masses, places - masses @ places / masses.sum())
+
+
+def potential(one: Points, other: Points, place: object, a: object, b: object, degree: int | None) -> object:
+    """U, exact or to a total degree: that of each pair is sum over l of (-1)^l |d|^l P_l(cos) / r^(l + 1)."""
+    number, total = mpmath.mpf, mpmath.mpf(0)
+    r = mpmath.sqrt(sum(x * x for x in place))
+    for (m, x), (n, y) in itertools.product(
+        zip(one.masses, one.places, strict=True), zip(other.masses, other.places, strict=True)
+    ):
+        d = [sum(b[i][k] * number(y[k]) - a[i][k] * number(x[k]) for k in range(3)) for i in range(3)]
+        if degree is None:
+            sized = 1 / mpmath.sqrt(sum((p + q) ** 2 for p, q in zip(place, d, strict=True)))
+        else:
+            far = mpmath.sqrt(sum(q * q for q in d))
+            c = sum(p * q for p, q in zip(place, d, strict=True)) / (r * far)
+            legendre = [1, c, (3 * c**2 - 1) / 2, (5 * c**3 - 3 * c) / 2, (35 * c**4 - 30 * c**2 + 3) / 8]
+            sized = sum((-far / r) ** n * legendre[n] for n in range(degree + 1)) / r
+        total -= number(G) * number(m) * number(n) * sized
+    return total
+
+
+def pulled(
+    one: Points, other: Points, place: np.ndarray, qs: list[np.ndarray], degree: int | None
+) -> np.ndarray:
+    """U, the force on the other, and the torques on both in their axes, by differences in 40 digits."""
+    with mpmath.workdps(40):
+        step = mpmath.mpf(10) ** -15
+        start = [mpmath.mpf(float(x)) for x in place]
+        turns = [[[mpmath.mpf(float(x)) for x in row] for row in matrix(q)] for q in qs]
+
+        def at(shift: int | None = None, body: int = 0, axis: int = 0, sign: int = 0) -> object:
+            where, now = list(start), list(turns)
+            if shift is not None:
+                where[shift] += sign * step
+            elif sign:
+                p, q = (axis + 1) % 3, (axis + 2) % 3
+                c, s = mpmath.cos(step), sign * mpmath.sin(step)
+                rows = [list(row) for row in now[body]]
+                for row, before in zip(rows, now[body], strict=True):
+                    row[p], row[q] = c * before[p] + s * before[q], c * before[q] - s * before[p]
+                now[body] = rows
+            return potential(one, other, where, *now, degree)
+
+        slopes = [-(at(i, sign=1) - at(i, sign=-1)) / (2 * step) for i in range(3)]
+        for body in (0, 1):
+            slopes += [-(at(None, body, i, 1) - at(None, body, i, -1)) / (2 * step) for i in range(3)]
+        return np.array([float(x) for x in (at(), *slopes)])
+
+
+def scene(
+    one: str, other: str, degree: int, place: object, velocity: object = (0, 0, 0), **more: object
+) -> str:
+    rates, q, q0 = (
+        more.pop(k, d) for k, d in (("rates", [[0, 0, 0]] * 2), ("q", [1, 0, 0, 0]), ("q0", [1, 0, 0, 0]))
+    )
+    second = f'[[rigid_bodies]]\nname = "second"\n{other}\nposition = {list(map(float, place))}\n'
+    second += f"velocity = {list(map(float, velocity))}\nquaternion = {list(map(float, q))}\n"
+    second += f"angular_velocity = {list(map(float, rates[1]))}\n"
+    initial = f"quaternion = {list(map(float, q0))}\nangular_velocity = {list(map(float, rates[0]))}"
+    load = f'kind = "mutual_gravity"\ndegree = {degree}'
+    return config(one, initial, load, more=second, **more)
+
+
+NAMES = [f"second_{x}" for x in ("x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "wx", "wy", "wz")]
+
+
+@pytest.mark.parametrize("degree", [2, 3, 4])
+@pytest.mark.parametrize("seed", seeds(1, 12))
+def test_force_and_torques_are_those_of_pairs_of_points(seed: int, degree: int) -> None:
+    """Against U of all pairs, truncated at the same total degree: any attitudes, rates and odd moments."""
+    random = Random(seed)
+    one, other = Points.drawn(random), Points.drawn(random)
+    place = 2 * random.quaternion()[:3] / np.linalg.norm(random.quaternion()[:3]) + [0.5, 1, 1]
+    system = prepare(rigidsim.parse(scene(one.keys, other.keys, degree, place))).system
+    qs, rates = [random.quaternion(), random.quaternion()], [random.vector(), random.vector()]
+    velocity = random.vector()
+    known = dict(zip(("wx", "wy", "wz", "qw", "qx", "qy", "qz"), [*rates[0], *qs[0]], strict=True))
+    known |= dict(zip(NAMES, [*place, *velocity, *qs[1], *rates[1]], strict=True))
+    state = np.array([known[name] for name in system.states])
+    found = dict(zip(system.states, derivative(system, state), strict=True))
+    u, *slopes = pulled(one, other, place, qs, degree)
+    force, *torques = np.array(slopes).reshape(3, 3)
+    reduced = one.mass * other.mass / (one.mass + other.mass)
+    size = np.linalg.norm(force / reduced)
+    np.testing.assert_allclose(
+        [found[f"second_v{x}"] for x in "xyz"], force / reduced, rtol=0, atol=3e-15 * size
+    )
+    np.testing.assert_allclose([found[f"second_{x}"] for x in "xyz"], velocity, rtol=1e-15)
+    for body, names, w, torque in (
+        (one, ("wx", "wy", "wz"), rates[0], torques[0]),
+        (other, NAMES[-3:], rates[1], torques[1]),
+    ):
+        spin = np.cross(body.inertia @ w, w)
+        expected = np.linalg.solve(body.inertia, spin + torque)
+        atol = (
+            1e-14
+            * np.linalg.norm(np.linalg.inv(body.inertia), 2)
+            * (np.linalg.norm(spin) + np.linalg.norm(torque))
+        )
+        np.testing.assert_allclose([found[name] for name in names], expected, rtol=0, atol=atol)
+    seen = observed(system, state)
+    assert seen["potential_energy"][0] == pytest.approx(u, rel=3e-15)
+    spins = [matrix(q) @ b.inertia @ w for q, b, w in zip(qs, (one, other), rates, strict=True)]
+    whole = sum(spins) + reduced * np.cross(place, velocity)
+    np.testing.assert_allclose(seen["angular_momentum"], whole, rtol=0, atol=1e-14 * np.linalg.norm(whole))
+    kinetic = (
+        sum(w @ b.inertia @ w for b, w in zip((one, other), rates, strict=True))
+        + reduced * velocity @ velocity
+    )
+    assert seen["energy"][0] == pytest.approx(kinetic / 2 + u, rel=1e-13)
+    assert seen["separation"][0] == pytest.approx(np.linalg.norm(place), rel=1e-15)
+
+
+def test_errors_of_the_series_fall_with_distance_as_its_first_missing_term() -> None:
+    """Of U and the force as r^-(n + 1), of the torque relatively as r^-(n - 1)."""
+    random = Random(5)
+    one, other = Points.drawn(random), Points.drawn(random)
+    qs, line = [random.quaternion(), random.quaternion()], random.vector()
+    line /= np.linalg.norm(line)
+    for degree in (2, 3, 4):
+        wrong = []
+        for far in (20.0, 40.0):
+            exact, cut = (pulled(one, other, far * line, qs, n) for n in (None, degree))
+            wrong.append([np.linalg.norm((cut - exact)[k]) / np.linalg.norm(exact[k]) for k in
+                          (slice(0, 1), slice(1, 4), slice(4, 7))])  # fmt: skip
+        orders = np.log2(np.array(wrong[0]) / wrong[1])
+        np.testing.assert_allclose(orders, [degree + 1, degree + 1, degree - 1], atol=0.3)
+
+
+def cloud(shape: str) -> tuple[str, Points]:
+    """A shape's keys, and points of Gauss's rules that integrate its moments to degree 5 and beyond."""
+    x, w = np.polynomial.legendre.leggauss(6)
+    turn = np.exp(2j * np.pi * np.arange(12) / 12)
+    grid = list(itertools.product(zip(x, w, strict=True), repeat=3))
+    if shape == "cuboid":
+        keys, places = "size = [0.6, 0.4, 0.2]", [[0.3 * a[0], 0.2 * b[0], 0.1 * c[0]] for a, b, c in grid]
+        weights = [a[1] * b[1] * c[1] for a, b, c in grid]
+    elif shape == "ellipsoid":  # radius, cosine and longitude
+        keys, places, weights = "semi_axes = [0.3, 0.25, 0.15]", [], []
+        for (r, wr), (c, wc) in itertools.product(zip((x + 1) / 2, w, strict=True), zip(x, w, strict=True)):
+            for e in turn:
+                across = r * math.sqrt(1 - c * c)
+                places.append([0.3 * across * e.real, 0.25 * across * e.imag, 0.15 * r * c])
+                weights.append(wr * wc * r**2)
+    else:  # a tube
+        keys, places, weights = "inner_radius = 0.1\nouter_radius = 0.3\nheight = 0.5", [], []
+        for (r, wr), (z, wz) in itertools.product(zip(0.2 + 0.1 * x, w, strict=True), zip(x, w, strict=True)):
+            for e in turn:
+                places.append([r * e.real, r * e.imag, 0.25 * z])
+                weights.append(wr * wz * r)
+    masses = MASS * np.array(weights) / sum(weights)
+    return f'shape = "{shape}"\nmass = {MASS!r}\n{keys}', Points(masses, np.array(places))
+
+
+@pytest.mark.parametrize("shape", ["cuboid", "ellipsoid", "tube"])
+def test_shapes_have_the_moments_of_their_volume(shape: str) -> None:
+    """Also as parts, moved and turned; the partner is one point, a sphere."""
+    keys, points = cloud(shape)
+    place, q = np.array([1.0, -0.7, 0.9]), np.array([0.9, 0.1, -0.3, 0.2])
+    sphere = f'shape = "sphere"\nradius = 0.2\nmass = {MASS!r}'
+    ball = Points(np.array([MASS]), np.zeros((1, 3)))
+    moved, share = np.array([0.1, 0.05, -0.1]), 0.5
+    part = keys.replace("\n", ", ")
+    parts = f"parts = [{{{part}, quaternion = {q.tolist()}, position = {moved.tolist()}}}, "
+    parts += f'{{shape = "sphere", radius = 0.1, mass = {share * MASS!r}}}]'
+    turned = points.places @ matrix(q / np.linalg.norm(q)).T + moved
+    heavy, middle = np.concatenate([points.masses, [share * MASS]]), np.vstack([turned, [0, 0, 0]])
+    whole = Points(heavy, middle - heavy @ middle / heavy.sum())
+    for given, truth in ((keys, points), (parts, whole)):
+        system = prepare(rigidsim.parse(scene(given, sphere, 4, place))).system
+        state = np.ldexp([float(x) for x in system.initial], system.state_exponents)
+        found = observed(system, state)["potential_energy"][0]
+        with mpmath.workdps(25):
+            eye = [[mpmath.mpf(i == k) for k in range(3)] for i in range(3)]
+            expected = [
+                float(potential(truth, ball, [mpmath.mpf(x) for x in place], eye, eye, n)) for n in (2, 4)
+            ]
+        assert abs(expected[1] - expected[0]) > 1e-6 * abs(expected[1])
+        assert found == pytest.approx(expected[1], rel=5e-15)
+
+
+# --- motions ------------------------------------------------------------------------------------------------
+
+
+def pair(degree: int = 4, **more: object) -> str:
+    """Two bodies of odd shapes on a close eccentric orbit."""
+    random = Random(11)
+    one, other = Points.drawn(random), Points.drawn(random)
+    q0, q = random.quaternion(), random.quaternion()
+    rates = [[0.1, 0.2, 0.9], [0.3, -0.2, 0.5]]
+    place, velocity = np.array([4.0, 0, 0.5]), np.array([0.1, 1.1, 0.1])
+    swap = more.pop("swap", False)
+    if swap:
+        one, other, q0, q, rates, place, velocity = other, one, q, q0, rates[::-1], -place, -velocity
+    return scene(one.keys, other.keys, degree, place, velocity, rates=rates, q=q, q0=q0, **more)
+
+
+def test_both_bodies_exchanged_move_alike() -> None:
+    time = "end = 100\nsamples = 6"
+    one, other = (
+        loaded(run_text(pair(swap=swap, time=time, integrator='precision = "extended"'))) for swap in (0, 1)
+    )
+    for first, second in ((one, other), (other, one)):
+        a, b = wide(first, "quaternion"), wide(second, "rigid_body_quaternion")[:, 0]
+        assert np.abs(a - b).max() < 1e-15
+    assert np.abs(wide(one, "rigid_body_position") + wide(other, "rigid_body_position")).max() < 1e-15
+    assert np.abs(wide(one, "energy") / wide(other, "energy") - 1).max() < 1e-17
+
+
+@pytest.mark.parametrize(
+    ("precision", "most"), [("double", 1e-13), ("extended", 5e-17), ("quadruple", 1e-31)]
+)
+def test_energy_and_momentum_stay(precision: str, most: float) -> None:
+    turns = {"double": 100, "extended": 10, "quadruple": 0.2}[precision]
+    degree = 2 if precision == "quadruple" else 4
+    text = pair(
+        degree,
+        time=f"end = {25 * turns}\nsamples = 60",
+        integrator=f'precision = "{precision}"\nhold_invariants = false',
+    )
+    data = loaded(run_text(text))
+    for name in ("energy", "angular_momentum", "rigid_body_quaternion_norm"):
+        assert np.abs(data[f"{name}_drift"]).max() < most, name
+
+
+def test_a_body_about_a_sphere_moves_as_by_central_gravity() -> None:
+    """By a sphere as heavy as nothing else, today's attractor at rest: relative motion of a reduced mass."""
+    random = Random(3)
+    q, w, place, velocity = random.quaternion(), [0.3, -0.2, 0.5], [3.0, 0.2, 0.4], [0.1, 0.6, 0.1]
+    heavy, time = 1e12 * MASS, "end = 20\nsamples = 11"
+    body = "inertia_tensor = [[2, 0.1, 0], [0.1, 3, 0.2], [0, 0.2, 4]]\nmass = 50"
+    sphere = f'shape = "sphere"\nradius = 0.2\nmass = {heavy!r}'
+    size = math.sqrt(G * heavy)
+    fast, quick = [float(size * v) for v in velocity], [float(size * x) for x in w]
+    time = f"end = {20 / size!r}\nsamples = 11"
+    both = loaded(run_text(scene(sphere, body, 2, place, fast, rates=[[0, 0, 0], quick], q=q, time=time)))
+    initial = f"quaternion = {q.tolist()}\nangular_velocity = {quick}\nposition = {place}\nvelocity = {fast}"
+    load = f'kind = "central_gravity"\ngravitational_parameter = {G * heavy!r}'
+    one = loaded(run_text(config(body, initial, load, time)))
+    np.testing.assert_allclose(
+        both["rigid_body_position"].values[:, 0], one["position"].values, rtol=0, atol=1e-11
+    )
+    np.testing.assert_allclose(
+        both["rigid_body_quaternion"].values[:, 0], one["quaternion"].values, rtol=0, atol=1e-11
+    )
+
+
+def test_resumed_has_the_same_bits(tmp_path: Path) -> None:
+    half, whole = (
+        pair(time=f"end = {end}\nevery = 5", integrator='precision = "extended"') for end in (50, 100)
+    )
+    done = run_text(half, tmp_path)
+    same_bits(run_text(whole), rigidsim.resume(done.folder.path, until="100"))
+
+
+MOON = '[[rigid_bodies]]\nname = "b"\nshape = "sphere"\nmass = 1e9\nradius = 1\n'
+MOON += "position = [5, 0, 0]\nangular_velocity = [0, 0, 0]\n"
+BODY = "principal_moments = [1, 2, 2.5]\nmass = 1e10"
+
+
+@pytest.mark.parametrize(
+    ("body", "load", "more", "words"),
+    [
+        (BODY, "degree = 2", "", "[[loads]] number 1 kind: given without [[rigid_bodies]]"),
+        (BODY, "degree = 5", MOON, "allowed: 2, 3, 4"),
+        (BODY, "degree = 3", MOON, "number 1 degree: given 3, but [body] has no moments of degree 3"),
+        ("principal_moments = [1, 2, 2.5]", "degree = 2", MOON, "[body] mass: missing"),
+        (
+            BODY,
+            "degree = 2",
+            MOON.replace("mass", "semi_axes = [1, 1, 1]#"),
+            "[[rigid_bodies]] number 1 semi_axes",
+        ),
+        (BODY, "degree = 2", MOON.replace("[5, 0, 0]", "[0, 0, 0]"), "[[rigid_bodies]] number 1 position"),
+        (BODY, "degree = 2", MOON + MOON.replace('"b"', '"c"'), "given 2; at most 1"),
+        (
+            f"{BODY}\ncenter_of_mass = [1, 0, 0]",
+            "degree = 2",
+            MOON,
+            "[body] center_of_mass: turns about another",
+        ),
+        (BODY, 'degree = 2\n[[loads]]\nkind = "uniform_gravity"', MOON, 'kind: given "uniform_gravity"'),
+        (BODY, 'degree = 2\n[model]\nlevel = "spin_averaged"', MOON, "rigid body b carries angular momentum"),
+        (BODY, 'degree = 2\n[[loads]]\nkind = "mutual_gravity"', MOON, "number 2 kind: given twice"),
+    ],
+)
+def test_refusals(body: str, load: str, more: str, words: str) -> None:
+    with pytest.raises(rigidsim.ConfigError, match=re.escape(words)):
+        prepare(rigidsim.parse(config(body, loads=f'kind = "mutual_gravity"\n{load}', more=more)))
+
+
+@pytest.mark.parametrize("formulation", ["rates", "canonical", "rotation_matrix"])
+def test_formulations_that_know_one_body_alone_are_refused(formulation: str) -> None:
+    text = pair(2, time="end = 5\nsamples = 2", integrator=f'formulation = "{formulation}"')
+    if formulation != "rotation_matrix":
+        with pytest.raises(rigidsim.ConfigError, match=r"reads the attitude|carries angular momentum"):
+            prepare(rigidsim.parse(text))
+        return
+    one, other = loaded(run_text(text)), loaded(run_text(pair(2, time="end = 5\nsamples = 2")))
+    np.testing.assert_allclose(one["rigid_body_position"], other["rigid_body_position"], rtol=0, atol=1e-13)
