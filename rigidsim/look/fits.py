@@ -122,7 +122,8 @@ def _mean_rate(time: Array, angle: Array, power: float = 1.0) -> float:
     """
     place = ((time[1:] + time[:-1]) / 2 - time[0]) / (time[-1] - time[0])
     weight = np.exp(-power / (place * (1 - place)))
-    return float(weight @ np.diff(angle) / (weight @ np.diff(time)))
+    # summed without BLAS, whose threads take a hundred times as long
+    return float((weight * np.diff(angle)).sum() / (weight * np.diff(time)).sum())
 
 
 @optional

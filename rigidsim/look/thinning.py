@@ -1,10 +1,13 @@
 """A bounded number of a dataset's rows, evenly strided or by extremes, read into memory piece by piece."""
 
+from collections.abc import Hashable
+from typing import Any
+
 import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-ROWS_AT_ONCE = 1 << 21
+ROWS_AT_ONCE = 1 << 19
 
 
 def thinned_indices(count: int, rows: int) -> NDArray[np.int64]:
@@ -40,45 +43,46 @@ def _thinned(dataset: xarray.Dataset, rows: int, *, extremes: bool) -> tuple[xar
     if "time" not in dataset.dims or "time" not in dataset.coords:
         raise ValueError("the dataset has no time coordinate: nothing to show along time")
     count = dataset.sizes["time"]
-    thinned_indices(count, rows)  # refuses what can't be
+    indices, stride = thinned_indices(count, rows), _stride(count, rows)
     along = {str(n): v for n, v in dataset.data_vars.items() if "time" in v.dims and v.dtype.kind in "fiub"}
-    wanted = dataset[[name for name, variable in along.items() if "residual_of" not in variable.attrs]]
-    stride = _stride(count, rows)
-    # A slice is a strided read in HDF5; a list of indices would be read index by index. Each read makes some
-    # kilobytes of notes for every chunk that it touches, hence pieces.
-    extremes = extremes and stride > 1
+    names = [name for name, variable in along.items() if "residual_of" not in variable.attrs]
+    plain, shown = dict[Hashable, xarray.Variable](), dict[Hashable, xarray.Variable]()
+    for name, variable in dataset[names].variables.items():
+        plain[name] = variable
+        if "time" in variable.dims:
+            bounds: bool = extremes and stride > 1 and name in along and variable.dtype.kind == "f"
+            dims = ("time", *(dim for dim in variable.dims if dim != "time"))
+            both = _values(variable, indices, stride, extremes=bounds)
+            plain[name], shown[name] = (xarray.Variable(dims, found, variable.attrs) for found in both)
+    coords = [name for name in plain if name not in along]
+    whole = xarray.Dataset(plain, attrs=dataset.attrs).set_coords(coords)
+    return whole, xarray.Dataset(plain | shown, attrs=dataset.attrs).set_coords(coords) if extremes else whole
+
+
+def _values(
+    variable: xarray.Variable, indices: NDArray[np.int64], stride: int, *, extremes: bool
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """The values at indices, time first, and those or their extremes as in `thin_with_extremes`."""
+    count, others = variable.sizes["time"], [n for dim, n in variable.sizes.items() if dim != "time"]
+    plain = np.empty((len(indices), *others), variable.dtype)
+    shown = np.empty_like(plain) if extremes else plain
+    # A slice is a strided read in HDF5; a list of indices would be read index by index.
     step, piece = 1 if extremes else stride, 2 * stride * max(1, ROWS_AT_ONCE // (2 * stride))
-    plain, shown = [], []
     for first in range(0, count, piece):
-        part = wanted.isel(time=slice(first, min(first + piece, count), step)).load()
-        strided = part.isel(time=slice(None, None, stride // step))
-        plain.append(strided.copy(deep=True))
+        part = variable.isel(time=slice(first, min(first + piece, count), step)).transpose("time", ...).values
+        strided = part[:: stride // step]
+        place = slice(first // stride, first // stride + len(strided))
+        plain[place] = strided
         if extremes:
-            shown.append(strided.map(_extremes, args=(part, 2 * stride)))
-    if (count - 1) % stride:
-        plain.append(wanted.isel(time=slice(count - 1, count)).load())
-        shown.append(plain[-1])
-    whole, *curves = (
-        xarray.concat(parts, dim="time", data_vars="all", combine_attrs="override").transpose("time", ...)
-        for parts in (plain, *([shown] if extremes else []))
-    )
-    for found in curves:
-        for name in found.data_vars:
-            found[name].values[[0, -1]] = whole[name].values[[0, -1]]
-    return whole, curves[0] if curves else whole
+            starts = np.arange(0, len(part), 2 * stride)
+            for k, (quick, sure) in enumerate(((np.minimum, np.fmin), (np.maximum, np.fmax))):
+                room, found = shown[place][k::2], quick.reduceat(part, starts)
+                room[...] = (sure.reduceat(part, starts) if np.isnan(found).any() else found)[: len(room)]
+    if indices[-1] % stride:
+        plain[-1] = variable.isel(time=-1).values
+    shown[[0, -1]] = plain[[0, -1]]
+    return plain, shown
 
 
 def _stride(count: int, rows: int) -> int:
     return max(1, -(-(count - 1) // (rows - 1)))
-
-
-def _extremes(strided: xarray.DataArray, part: xarray.Dataset, pair: int) -> xarray.DataArray:
-    found = strided.copy(deep=True)
-    if found.dtype.kind == "f":
-        along = found.dims.index("time")
-        values, target = np.moveaxis(part[found.name].values, along, 0), np.moveaxis(found.values, along, 0)
-        starts = np.arange(0, len(values), pair)
-        for k, reduce in enumerate((np.fmin, np.fmax)):
-            room = target[k::2]
-            room[...] = reduce.reduceat(values, starts)[: len(room)]
-    return found

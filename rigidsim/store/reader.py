@@ -26,6 +26,7 @@ from rigidsim.store.netcdf import (
     reading,
     root_attributes,
     rows_in,
+    stored_rows,
 )
 from rigidsim.store.variables import LABELS, OF_THE_RUN, Extra, Variable, used_labels
 
@@ -246,5 +247,5 @@ class _Joined(BackendArray):
             if len(inside) or path == self._paths[0]:
                 part = slice(inside.start - start, inside.stop - start, inside.step) if inside else slice(0)
                 with reading(path) as file:
-                    pieces.append(np.asarray(rows_in(file)[self._name][(part, *rest)]))
-        return np.concatenate(pieces)
+                    pieces.append(stored_rows(rows_in(file)[self._name], part)[:, *rest])
+        return pieces[0] if len(pieces) == 1 else np.concatenate(pieces)

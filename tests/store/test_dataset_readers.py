@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import h5py
@@ -15,7 +16,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rigidsim
+from rigidsim.errors import RunFolderError
 from rigidsim.solve.precision import Precision, precision_of
+from rigidsim.store.netcdf import ChunkedVariable, reading, stored_rows
 
 PRECISIONS = ['"double"', '"quadruple"']
 
@@ -178,3 +181,30 @@ def test_parts_are_exact(name: str | int, data: st.DataObject) -> None:
             for part in reversed(parts):
                 total += mpmath.mpf(float(part[i]))
             assert total == mpmath.mpf(value.numerator) / value.denominator
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_chunks_that_cannot_be_compressed_hold_the_same_numbers(seed: int, tmp_path: Path) -> None:
+    rng, path = np.random.default_rng(seed), tmp_path / "chunks.h5"
+    rows, width, height = int(rng.integers(1, 600)), int(rng.integers(1, 4)), int(rng.integers(1, 40))
+    values = rng.standard_normal((rows, width))
+    values[rows // 2 :] = np.round(values[rows // 2 :], int(rng.integers(0, 12)))  # some bytes repeat there
+    values[rng.random(rows) < 0.1] = np.nan
+    with h5py.File(path, "w") as file:
+        filters = {"compression": "gzip", "shuffle": True, "chunks": (height, width)}
+        chunks = ChunkedVariable(file.create_dataset("x", (rows, width), "<f8", **filters))
+        for part in np.array_split(values, 5):
+            chunks.add(part)
+        chunks.finish()
+    with h5py.File(path) as file:
+        np.testing.assert_array_equal(file["x"][()], values)  # HDF5's own filters
+        for _ in range(20):
+            first, stop = sorted(rng.integers(0, rows + 1, 2).tolist())
+            part = slice(first, stop, int(rng.integers(1, 90)))
+            np.testing.assert_array_equal(stored_rows(file["x"], part), values[part])
+    content = bytearray(path.read_bytes())
+    with h5py.File(path) as file:
+        content[file["x"].id.get_chunk_info(0).byte_offset + 5] ^= 64
+    path.write_bytes(content)
+    with pytest.raises(RunFolderError, match="can't be read"), reading(path) as file:
+        stored_rows(file["x"], slice(None))

@@ -8,6 +8,7 @@ from itertools import cycle
 from typing import Any, Self
 
 import numpy as np
+import pyarrow as pa
 import rerun as rr
 import xarray
 from numpy.typing import NDArray
@@ -140,6 +141,21 @@ Lane = tuple[str, Array, list[str], dict[str, Color]]
 
 
 @dataclass(frozen=True)
+class _Cut:
+    """Rows of a column for the viewer, in Arrow already; it has the names of the column."""
+
+    of: Any
+    rows: pa.Array
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.of, name)
+
+    def as_arrow_array(self) -> pa.Array:
+        """The rows."""
+        return self.rows
+
+
+@dataclass(frozen=True)
 class DrawnRun:
     """Everything drawn of one dataset: of its `rows` in memory, numbered by `steps`, with pages of markdown
     by name.
@@ -210,7 +226,7 @@ class DrawnRun:
         before: Callable[[int], None] = lambda rows: None,
     ) -> None:
         """Draw what holds for all times, and what changes from the first of the rows to be drawn on, in
-        chunks; before each the function gets the number of rows that are still to come.
+        chunks; before each entity the function gets how many rows of all entities that still makes.
         """
         shown = self.entities(legend)
         for name, text in self.pages.items():
@@ -223,18 +239,19 @@ class DrawnRun:
                 recording.log(path, *part.static, static=True)
         for lane in self.states:
             draw_lane(recording, lane, self.clock)
-        count = len(self.seconds)
-        for start in range(first, count, CHUNK):
-            before(count - start)
-            rows = slice(start, min(start + CHUNK, count))
-            times = self._times(rows)
-            for path, part in shown:
-                if part.columns is not None:
-                    picked = part.picked(rows)
-                    if len(self.steps[picked]):
-                        plain = part.stride == 1 and part.only is None
-                        indexes, columns = times if plain else self._times(picked), part.columns(picked)
-                        recording.send_columns(path, indexes=indexes, columns=columns)
+        count, moved = len(self.seconds), [(path, part) for path, part in shown if part.columns is not None]
+        for number, (path, part) in enumerate(moved):
+            before((count - first) * (len(moved) - number) // len(moved))
+            picked = part.picked(slice(first, count))
+            # converted once, and then cut
+            whole = [
+                [(one, one.as_arrow_array()) for one in found]
+                for found in (self._times(picked), need(part.columns)(picked))
+            ]
+            for start in range(0, len(self.steps[picked]), CHUNK):
+                sent: list[list[Any]]
+                sent = [[_Cut(one, rows.slice(start, CHUNK)) for one, rows in found] for found in whole]
+                recording.send_columns(path, indexes=sent[0], columns=sent[1])
 
     def _times(self, rows: Rows) -> list[rr.TimeColumn]:
         return [self.clock.column(self.clock.ticks[rows]), rr.TimeColumn("step", sequence=self.steps[rows])]
