@@ -475,7 +475,7 @@ def _explored(
 
 
 def _timed(worker: Worker, plan: Plan, rows: list[_Row], repeat: int, until: float) -> bool:
-    """Measure speeds in one process, in an order of its own; the default setting's at the beginning, in the
+    """Measure speeds in one process, in a separate order; the default setting's at the beginning, in the
     middle and at the end. Returns whether all were measured.
     """
     default, *others = [row for row in rows if row.status in (RowStatus.MEASURED, RowStatus.SHORT)]

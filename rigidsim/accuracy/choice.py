@@ -76,7 +76,7 @@ if TYPE_CHECKING:
 PILOT_STEPS = 20_000
 """Pilot steps in double precision at its epsilon: some tens of milliseconds."""
 _FOLLOWED = 900
-"""Steps whose errors are followed to see how the motion amplifies them: so many need no code of their own."""
+"""Steps whose errors are followed to see how the motion amplifies them; this many need no separate code."""
 _FEWEST_STEPS = 16  # for the law of rounding, which is one of many steps
 
 

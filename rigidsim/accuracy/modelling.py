@@ -1,4 +1,4 @@
-"""Error of an averaged model, measured over windows in which every rotation is resolved beside it.
+"""Error of an averaged model, measured over windows in which the full model runs as well.
 
 At the beginning, the middle and the end of the span the full motion starts from the averaged one's state,
 with what averaging removed added back, and both are followed. Their difference is a growth, which the

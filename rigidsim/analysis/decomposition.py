@@ -2,7 +2,7 @@
 
 Frequency analysis after Laskar (1993, Physica D 67, 257) with the corrections of Sidlichovsky & Nesvorny
 (1996, Celest. Mech. Dyn. Astron. 65, 137), which free each line of what all others do to it: here as a Newton
-iteration of all frequencies, amplitudes and polynomial coefficients at once on what is left of the signal,
+iteration of all frequencies, amplitudes and polynomial coefficients at once on the residual,
 until the windowed remainder is orthogonal to every exp(i w t), to t exp(i w t) and to the polynomial. A
 signal that is such a sum has it as its fixed point, whatever the distance of its lines. The steps are
 computed in double precision, the remainder in the signal's own: each step gains digits, until there are no
@@ -41,7 +41,7 @@ _LONGEST = 3.0  # half lengths that a slow part may take to change by e, where t
 
 @dataclass(frozen=True)
 class Decomposition:
-    """Components of a signal: polynomial, and lines (of a real signal those of positive frequency: twice
+    """Components of a signal: polynomial, and lines (of a real signal with positive frequencies: twice
     their real part). Errors are one standard deviation, from the remainder next to the line, in turns per
     sample and the signal's unit; ``level`` is the median size of the remainder's windowed spectrum; the rest
     is as of ``result.SignalAnalysis``, in turns per sample.

@@ -110,8 +110,8 @@ def label(
 
     Where nothing fits within the error, combinations within ``blend``, far less than a bin, do: a line can
     have absorbed others that are too close to be separated. One whose error is about a bin gets no label.
-    Where chance would fit as many combinations of all that is known, those of the frequencies below Nyquist's
-    are tried alone.
+    Where chance would fit as many combinations of all known frequencies, only frequencies below Nyquist's are
+    combined.
     """
     if _SIGMAS * error > resolution:
         return Label()

@@ -26,7 +26,7 @@ class SpectralLine:
     Attributes:
         frequency: w, rad/s (mpf with the digits of the samples), unfolded if ``label.folds`` says so.
         observed: frequency before unfolding.
-        frequency_error: one standard deviation, from what is left of the signal beside the line.
+        frequency_error: one standard deviation, from the residual next to the line.
         amplitude: A, in the signal's unit; mpf.
         phase: at time zero of the scene, rad within +-pi; mpf.
         phase_error: error of the phase in the middle of the samples, rad.

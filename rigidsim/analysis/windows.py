@@ -17,7 +17,7 @@ Complexes = NDArray[np.complex128]
 
 _POINTS, _FINE = 1024, 1 << 17  # of the quadrature behind ``moments``
 _REACH = 200.0  # bins beyond which lines don't feel each other while steps are computed
-_ASIDE = 256  # spectral points to either side whose median is the noise beside a line
+_ASIDE = 256  # spectral points to either side whose median is the noise next to a line
 
 
 @lru_cache(maxsize=2)
@@ -81,7 +81,7 @@ class Spectrum:
         return slice(*np.searchsorted(self.frequencies, ends).tolist())
 
     def noise(self, at: int, reach: float) -> float:
-        """Median size beside a point, without points within ``reach`` bins."""
+        """Median size next to a point, without points within ``reach`` bins."""
         near = self.around(float(self.frequencies[at]), reach)
         beside = np.concatenate(
             [self.sizes[max(near.start - _ASIDE, 0) : near.start], self.sizes[near.stop : near.stop + _ASIDE]]

@@ -69,7 +69,7 @@ class Format:
     Attributes:
         write: writes a ``Table`` to a path that doesn't exist yet.
         angles: whether it takes angles in any unit.
-        side_tables: whether tables along other dimensions than time get files of their own.
+        side_tables: whether tables along other dimensions than time get separate files.
         suffix: of its files; by default the format's name.
         beside: files that it needs beside, by their suffixes, and what writes them.
         between: whether it holds the motion between the samples, too.

@@ -75,7 +75,7 @@ class SpiceRun:
     Attributes:
         first, last: between which it is written.
         ahead: date of time 0, s.
-        number: of its own, from its config, so that kernels of different runs can be loaded together.
+        number: unique, from the config, so that kernels of different runs can be loaded together.
         class_number: of its frame as a PCK's.
         name, body: of the frame; NAIF's number of the body, 0 if nothing says which it is.
         fastest: largest recorded norm of the angular velocity, rad/s.

@@ -1,7 +1,7 @@
 """A dataset as flat tables, read block by block, from which CSV, Parquet and the CCSDS messages are written;
 and as a Zarr store.
 
-A run's first table has a row per sample; each event, and the Lyapunov estimates, have a table of their own. A
+A run's first table has a row per sample; each event, and the Lyapunov estimates, have separate tables. A
 sweep's has a row per member; variables with a dimension besides the members' (the samples of whole series,
 occurrences of an event, spectral lines) form a long table for that dimension, and every table begins with the
 member's number and the values that identify it. A vector becomes a column per component

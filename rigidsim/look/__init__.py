@@ -5,8 +5,8 @@ rerun, `figures` matplotlib. All else is numbers and texts, for both.
 
 | module | holds |
 | --- | --- |
-| `timeline` | `write_timeline`, `write_comparison`: datasets to a recording of rerun; a package of its own |
-| `figures` | figures by name, dataset to matplotlib, PNG or SVG; a package of its own |
+| `timeline` | `write_timeline`, `write_comparison`: datasets to a recording of rerun; a package |
+| `figures` | figures by name, dataset to matplotlib, PNG or SVG; a package |
 | `figure_names` | their names, without any import |
 | `record`, `signals` | the recorded scene of a dataset; its quantities and times |
 | `curves`, `paths` | what is drawn over time, and in planes, in one form for both |

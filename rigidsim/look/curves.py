@@ -70,7 +70,7 @@ class Plot:
         labels, hues: by curve; a single one needs no label.
         word: what the axis of values says before the unit.
         place: "leading", "more" or "drift".
-        begins: the start is shown beside the whole, if that is a solid band.
+        begins: the start is shown next to the whole, if that is a solid band.
         sparse: samples too far apart to be joined. log: on a logarithmic axis. from_zero: it begins there.
         levels: values for the whole run by label. band: lower and upper edge (rows,).
         window: rows about the cursor that a timeline shows of a long fast motion; 0 for the whole run.

@@ -192,7 +192,7 @@ class HeadlessViewer:
                     f"rerun+http://{LOOPBACK}:{self._port}/proxy"
                 )
                 state = self.client.get_state()
-            except Exception as problem:  # not listening yet; the client has no error of its own kind
+            except Exception as problem:  # not listening yet; the client has no specific error
                 reason, self.client = f"no answer in time ({problem})", None
                 continue
             opened = [r for r in state.recordings if r.current_timeline and r.current_time is not None]

@@ -92,7 +92,7 @@ def path(dataset: xarray.Dataset) -> Array:
 @dataclass(frozen=True)
 class Equilibrium:
     """A spin that stays: the momentum's direction (3,), body axes, and the linearised equations' exponents
-    beside it, ± the root of `square`, 1/s^2: imaginary if it is stable, real if not, unknown if zero.
+    next to it, ± the root of `square`, 1/s^2: imaginary if it is stable, real if not, unknown if zero.
     """
 
     direction: Array

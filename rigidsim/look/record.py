@@ -73,12 +73,12 @@ class RecordedScene:
 
     @property
     def has_rotors(self) -> bool:
-        """Whether rotors carry momentum of their own: those kept at rest don't."""
+        """Whether rotors carry momentum relative to the body; rotors kept at rest don't."""
         return any(one["drive"] != "fixed" or one["rate"] for one in self.rotors)
 
     @property
     def carries_within(self) -> bool:
-        """Whether rotors or a fluid core carry momentum of their own."""
+        """Whether rotors or a fluid core carry momentum relative to the body."""
         return self.has_rotors or self.core
 
     @property

@@ -107,7 +107,7 @@ def body_meshes(drawing: Sequence[Mapping[str, Any]]) -> list[Mesh]:
         float(np.linalg.norm(shift)) if mesh is None else mesh.reach()
         for mesh, (_, _, shift) in zip(meshes, solids, strict=True)
     )
-    reach = reach or 1.0  # a single point at the reference point has no size of its own
+    reach = reach or 1.0  # a single point at the reference point has no size
 
     def point(entry: Mapping[str, Any], turn: Array, shift: Array) -> Mesh:
         fraction = float(entry.get("dimensions", {}).get("mass_fraction", 1.0))

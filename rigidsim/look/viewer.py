@@ -109,7 +109,7 @@ def running(
     arguments: Sequence[str], *, own_home: bool = False, **environment: str
 ) -> Iterator[tuple[subprocess.Popen[bytes], Path]]:
     """A viewer that is ended with the context, and given a place for temporary files that goes with it, where
-    it would leave a folder for its catalogue; with a home of its own, without the user's settings, whose log
+    it would leave a folder for its catalogue; with a separate home, without the user's settings, whose log
     is the file that comes with it.
     """
     command = [str(viewer_binary()), *arguments, "--bind", LOOPBACK]

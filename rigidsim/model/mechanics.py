@@ -1,6 +1,6 @@
 """What the loads of a scene do: torque, force, energy and power as expressions of its states.
 
-**Carriers** have angular momentum and kinetic energy beside the body: rotors, a fluid core. With the body's I
+**Carriers** add angular momentum and kinetic energy to the body's: rotors, a fluid core. With the body's I
 w and the momentum h_k of each carrier, all in body axes,
 
     L = I w + sum of h_k,    T = w . I w / 2 + sum of T_k,
@@ -73,7 +73,7 @@ def carried_beside(loads: Iterable[Load]) -> str:
 
 
 def momentum_terms(carriers: Iterable[Any], m: Kinematics) -> list[Term]:
-    """Momentum of all carriers beside the body; what is zero for good is left out."""
+    """Momentum of all carriers without the body; what is zero for good is left out."""
     terms = (term for carrier in carriers for term in carrier.carried_momentum(m))
     return [(vector, hy.expression(part)) for vector, part in terms if any(x != 0 for x in vector)]
 
@@ -149,7 +149,7 @@ class Mechanics(Kinematics):
 
     @cached_property
     def carriers(self) -> list[Any]:
-        """What carries angular momentum beside the body."""
+        """Loads that carry angular momentum."""
         return [load for load in self.loads if isinstance(load, Carrier)]
 
     @cached_property
@@ -210,7 +210,7 @@ class Mechanics(Kinematics):
             return self.scene.angular_velocity
         momentum = multiply(self.scene.turning_inertia, self.scene.angular_velocity)
         for carrier in self.carriers:
-            if carrier.changes:  # which has none of its own
+            if carrier.changes:  # which has none
                 own, _ = carrier.carried_at_start(self.scene)
                 momentum = [x + y for x, y in zip(momentum, own, strict=True)]
         return multiply(self.scene.inverse_inertia, momentum)

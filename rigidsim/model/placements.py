@@ -885,7 +885,7 @@ def kernel_body(source: str, around: Setting) -> Ephemeris:
 
 
 def refuse_series(around: Setting) -> None:
-    """Refuse analytic series beside a kernel whose axes they don't share."""
+    """Refuse analytic series with a kernel whose axes they don't share."""
     ensure(
         around.ephemeris is None or around.axes is not None,
         around.fault(

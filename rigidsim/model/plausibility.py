@@ -33,7 +33,7 @@ _CUBIC_KILOMETRE = 1e9  # m^3
 _AS_PUBLISHED = 1e-3  # relative difference up to which a number is a published one in other units
 _FARTHEST = 1e5  # radii of a body: its orbits and neighbours are nearer (Neptune is at 6500 of the Sun)
 _HEIGHT = 1e5  # m: a length from here on may be an altitude
-_DEEP = 0.01  # of the radius: what is nearer to the centre is no altitude, but on a scale of its own
+_DEEP = 0.01  # of the radius: what is nearer to the centre is no altitude
 _SURFACE = 0.99  # of the equatorial radius: orbits may graze flattened bodies
 _ROUGHLY = 0.02  # relative difference of a radius, mean or equatorial, from the published one
 _SIMILAR = 10.0  # ratio of an air density's altitude to the altitude of a flight in it
@@ -56,7 +56,7 @@ _ALIKE = 2e-3  # relative difference of a spin from the orbit's rate, as far as 
 
 
 def about_load(load: Load, fields: LoadFields, where: str, scene: Scene) -> Iterator[Caution]:
-    """Values of a load's keys by which its source, or the start beside it, is implausible."""
+    """Values of a load's keys by which its source, or the start near it, is implausible."""
     given: Any = getattr(fields, "gravitational_parameter", None)
     name, elements = getattr(fields, "source", None), getattr(fields, "elements", None)
     placed, number = fields.placed_by(free_flight=scene.free_flight), getattr(load.placement, "number", None)
@@ -258,7 +258,7 @@ def _about_period(
     )
 
 
-# --- spins beside an orbit ----------------------------------------------------------------------------------
+# --- spins near a resonance ---------------------------------------------------------------------------------
 
 
 def _about_spin(

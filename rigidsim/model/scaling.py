@@ -2,7 +2,7 @@
 
 heyoka's step control is absolute below 1 and relative to the largest component above: a spin of 1e-6 rad/s
 or a component dwarfed by another loses digits. Inside the equations time, inertia, length and each state
-are therefore measured in a unit of their own; results are multiplied back, exactly, when they are stored.
+are therefore measured in separate units; results are multiplied back, exactly, when they are stored.
 Every coefficient is worked out in the scene's arithmetic (mpmath with guard bits) and rounded once.
 """
 
@@ -66,7 +66,7 @@ class Scaling:
         return self.inertia - 2 * self.time
 
 
-# A component is given a unit of its own only where it stays this far below the fastest one: within this
+# A component is given a separate unit only where it stays this far below the fastest one: within this
 # factor step control sees it well enough, and the equations stay the simplest.
 _WORTH_A_UNIT = 4  # bits
 

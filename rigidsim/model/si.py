@@ -190,7 +190,7 @@ def _own_states(m: Kinematics, block: StateBlock) -> dict[str, Symbolic]:
 
 
 def _block(m: Kinematics, given: StateBlock) -> StateBlock:
-    """States with derivatives and initial values in SI, in units of their own."""
+    """States with derivatives and initial values in SI, in separate units."""
     context, own = m.scene.context, _own_states(m, given)
     units = given.unit_exponents
     return replace(

@@ -3,7 +3,7 @@
 A coefficient rounded once has a fixed error, and so have the motion's frequencies: its phase errs by eps t.
 Where invariants are projected nothing else grows as fast, so there each product c x becomes hi x + lo x.
 
-``hi`` has half the digits, not all: beside a product rounded to the last bit a part below half of that bit
+``hi`` has half the digits, not all: next to a product rounded to the last bit a part below half of that bit
 would always be rounded away again. With half the digits lo x reaches well into the sum, hi + lo is c to half
 as many digits again as the working precision has, and what is rounded is the product alone, to either side.
 

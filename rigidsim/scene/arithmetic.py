@@ -56,7 +56,7 @@ class _Context(mpmath.MPContext):
 
 
 def context_for(precision: str | int, more: int = 0) -> Any:
-    """An mpmath context of its own (never the global one) with guard bits, and so many more of them."""
+    """A separate mpmath context (never the global one) with guard bits, and so many more of them."""
     context = _Context()
     context.guard_bits = GUARD_BITS + more
     context.prec = working_bits(precision) + context.guard_bits

@@ -171,7 +171,7 @@ class InUnit:
 
 
 def quantity(unit: str) -> Any:
-    """Type of a key in an SI unit, for loads of your own: ``Joule = quantity("J")``."""
+    """Type of a key in an SI unit, for user-defined loads: ``Joule = quantity("J")``."""
     return Annotated[ExactNumber, InUnit(unit)]
 
 

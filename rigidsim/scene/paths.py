@@ -156,7 +156,7 @@ class Path:
         fields = [x for _, about in kinds for x in about if isinstance(x, FieldInfo)]
         extra = [x.json_schema_extra for x in fields if isinstance(x.json_schema_extra, dict)]
         beside = [table.get(x.get("x-unit-key")) for x in extra if isinstance(table, Mapping)]
-        unit = next((unit for unit in beside if isinstance(unit, str)), None)  # written beside the number
+        unit = next((unit for unit in beside if isinstance(unit, str)), None)  # written next to the number
         counts = [x.count for _, about in kinds for x in about if isinstance(x, Exactly)]
         counts += [n for x in extra if isinstance(n := x.get("minItems"), int) and n == x.get("maxItems")]
         ranges = [x for _, about in kinds for x in about if isinstance(x, Range)]

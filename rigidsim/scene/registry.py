@@ -201,7 +201,7 @@ class SceneLoad:
 
     @classmethod
     def beside_of(cls, load: SceneLoad, fields: Any, around: Setting) -> SceneLoad | None:
-        """The load that a key of another load brings beside it, on the same source; None where the key's
+        """The load that a key of another load brings with it, on the same source; None where the key's
         value brings none.
 
         Args:

@@ -62,7 +62,7 @@ class Scene(Setting):
         samples: the times at which a run is recorded.
         loads: those that act, or that something reads, without uniform fields.
         given_loads: all of ``[[loads]]``, in their order.
-        tabled: all of loads with tables of their own, such as rotors, by the table's name.
+        tabled: all of loads with separate tables, such as rotors, by the table's name.
         gravity: sum of all uniform fields, space axes, m/s^2; None without such a load.
         states: the states of ``[[states]]`` that are carried.
         events: crossings that are recorded, or end the run.
@@ -71,7 +71,7 @@ class Scene(Setting):
         inverse_inertia: its pseudo-inverse.
         reference: unit normal (space axes) of the plane that obliquity and longitudes count from; None for
             a source's own, moving plane.
-        orientation: the published one beside which the attitude is recorded; None without one.
+        orientation: the published one recorded with the attitude; None without one.
         quaternion: initial unit quaternion, body to space.
         angular_velocity: initial angular velocity, body axes, rad/s.
         euler_angles: as given in ``euler_sequence`` (radians), or None if given otherwise.

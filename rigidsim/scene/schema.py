@@ -671,7 +671,7 @@ class OwnStateTable(ConfigTable):
 
 
 class Config(ConfigTable):
-    """One experiment; ``config_model`` knows the kinds of loads beside."""
+    """One experiment; ``config_model`` adds the kinds of loads."""
 
     name: Annotated[StrictStr, named(rf"(?!\.*$){_FOLDER_NAME}", _ABOUT_NAME)] = Field(
         examples=["intermediate_axis"], json_schema_extra={"pattern": _FOLDER_NAME}
@@ -946,7 +946,7 @@ def _key(node: Mapping[str, Any]) -> dict[str, Any]:
     _bounded(key)
     if "default" in key:
         key["default"] = as_written(key["default"])
-    if "$ref" in key and len(key) > 1:  # draft 7 ignores anything beside a reference
+    if "$ref" in key and len(key) > 1:  # draft 7 ignores anything next to a reference
         key["allOf"] = [{"$ref": key.pop("$ref")}]
     return key
 
@@ -964,7 +964,7 @@ def _without_null(key: dict[str, Any]) -> dict[str, Any]:
 
 
 def _units(node: Any) -> set[str]:
-    """Units of all numbers of a key, except those in tables of their own."""
+    """Units of all numbers of a key, except numbers in separate tables."""
     if isinstance(node, Mapping):
         own = {node["x-unit"]} if "x-unit" in node else set()
         inner = (value for name, value in node.items() if name not in ("default", "examples"))

@@ -67,7 +67,7 @@ RATES = ("angular_velocity", "angular_momentum", "spin_period")
 _BESIDE = {"node_longitude": ("obliquity",), "prime_meridian": ("pole", "obliquity")}
 """Keys that give nothing alone, and what each counts with."""
 _BESIDE_FOUND = {"relative": ATTITUDES}
-"""What may stand beside an equilibrium; a Cassini state takes a period."""
+"""What may be given with an equilibrium; a Cassini state takes a period."""
 _IN_SPACE = ("pole", "obliquity", "angular_momentum", "equilibrium")
 """Keys that count in space, whatever turns."""
 STARTS: dict[str, Callable[[Any], InitialRotation]] = {}

@@ -3,7 +3,7 @@ for, and the same scene with other numbers there.
 
 ``initial.attitude`` stands for a rotation vector (body axes, rad) by which the config's own start is turned;
 its value is zero. The angular velocity that the config gives is kept thereby, or the momentum in space. A
-tensor of inertia stays symmetric: an entry beside the diagonal stands for both.
+tensor of inertia stays symmetric: an off-diagonal entry stands for both.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class VariedKey:
         unit: its SI unit; "1" for none or one that the config doesn't give.
         places: where it stands in the config; empty for a component of ``initial.attitude``.
         number: its value, SI.
-        size: of numbers beside it, for what is small against it where it is zero.
+        size: of numbers next to it, for what is small against it where it is zero.
         component: of ``initial.attitude``.
     """
 

@@ -17,7 +17,7 @@ from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.sampler import Progress
 
 _LINE_EVERY = 5.0  # seconds between plain lines
-_TITLE = 24  # letters of a name beside the bar
+_TITLE = 24  # letters of a name next to the bar
 _PHASES = {
     "lyapunov": "Lyapunov exponents",
     "modelling": "full model",

@@ -1,4 +1,4 @@
-"""The published orientation beside a run's attitude, sample by sample, and the rotation between the two.
+"""The published orientation and a run's attitude, sample by sample, and the rotation between the two.
 
 Each row depends on its own time and attitude alone, so that no resumption can be seen in it.
 """
@@ -57,7 +57,7 @@ class PublishedAttitude:
         ]  # fmt: skip
 
     def of_samples(self, rows: Mapping[str, Sequence[np.ndarray]]) -> Columns:
-        """Its columns beside those that were recorded: parts of time, quaternion, and angles of the pole."""
+        """Its columns next to the recorded ones: parts of time, quaternion, and angles of the pole."""
         orientation, attitude = self.orientation, rows[QUATERNION][0].astype(np.float64)
         dates = orientation.dates([np.ravel(part) for part in rows["time"]])
         try:

@@ -1,4 +1,4 @@
-"""Sensitivities beside a run's samples: derivatives of attitude, rates and position by keys of its config.
+"""Sensitivities at a run's samples: derivatives of attitude, rates and position by keys of its config.
 
 The run's own integrator knows nothing of them. A second one carries the motion with its tangents from sample
 to sample, and is set on the run's own state every few steps, so that the derivatives belong to the motion
@@ -29,7 +29,7 @@ NAMES = {
     "angular_velocity_sensitivity": ("body_axis", "rad s-1", "angular velocity", "body axes"),
     "position_sensitivity": ("space_axis", "m", "position", "space axes"),
 }
-"""Dimension beside the parameter's, unit for one SI unit of a key, what is differentiated, and its frame."""
+"""Dimension besides the parameter's, unit for one SI unit of a key, what is differentiated, and its frame."""
 
 Columns = dict[str, list[np.ndarray]]
 

@@ -125,7 +125,7 @@ def _seen(place: Vector, scene: Scene) -> Iterator[str]:
 
 
 def _together(plan: ModelPlan, load: Load) -> list[Load]:
-    """A load with what acts beside it, whose torque and force are shown.
+    """A load with its supplements, whose torque and force are shown.
 
     Nothing of long series, or of a source whose place isn't known.
     """

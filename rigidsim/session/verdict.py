@@ -59,7 +59,7 @@ LEAST: dict[str, Soundness] = {
     WarningCode.STRENGTH_CONTRADICTS: Soundness.SOUND,
     WarningCode.HOST_WITHOUT_GRAVITY: Soundness.SOUND,
 }
-"""The best that can be said of a run beside each warning; of a later version's warnings ``LIMITED``."""
+"""The best that can be said of a run with each warning; of a later version's warnings ``LIMITED``."""
 _DEGREES = list(Soundness)
 
 

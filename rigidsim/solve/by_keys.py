@@ -224,7 +224,7 @@ class Parametrised:
         return [key.scale(self.context) / 2 ** (self._bits + _OFF + _STEP) for key in self.keys]
 
     def _standing_off(self, values: Sequence[Fraction]) -> Iterator[list[Fraction]]:
-        """Values a little off, each in a proportion of its own, in patterns of signs: a thin plate's moments,
+        """Values a little off, each in a different proportion, in patterns of signs: a thin plate's moments,
         for instance, can only change to one side.
         """
         amounts = [

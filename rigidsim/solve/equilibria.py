@@ -14,7 +14,7 @@ scene has it. Numbers go in and out as mpf.
 With the orbit's rate n and normal o the body turns at w = n o, and its equations leave w' = 0 in body axes at
 24 attitudes under the gradient alone: each principal axis along the source's direction, the orbit's normal,
 or forward (Lagrange 1780; Hughes, Spacecraft Attitude Dynamics, 1986, ch. 9). With other loads that rest in
-the turning frame, or momentum in the body, Newton's method leads from one of these to the zero beside it.
+the turning frame, or momentum in the body, Newton's method leads from one of these to the nearby zero.
 
 With the least axis towards the source and the largest along the normal the dynamic potential is least, and
 the equilibrium is stable (Lagrange); others may be held by gyroscopic torques alone (DeBra and Delp 1961, J.
@@ -26,7 +26,7 @@ for a turn d and a change v of the rates, both along body axes, and w' = f(attit
 
 **Cassini states**: motions that are the same after each revolution, in the frame that turns with the node.
 
-Averaged equations say where the state is (``averaged_states``). The full equations have a motion beside it
+Averaged equations say where the state is (``averaged_states``). The full equations have a motion near it
 that is periodic in the node's frame: with the orbit at the same place after T, Newton's method finds the pose
 that comes back, turned with the node (and, for A = B, about the figure axis by any angle). It has no free
 libration. T is one revolution from pericentre to pericentre, two for a half-odd number of turns; if apsides
@@ -123,7 +123,7 @@ def widths(scene: Scene) -> list[Precision]:
 
 
 class PoseMotion(AnyStart):
-    """The motion of a scene in one arithmetic; what else is in it, such as rotors, begins beside a pose."""
+    """The motion of a scene in one arithmetic; what else is in it, such as rotors, starts near a pose."""
 
     def __init__(self, scene: Scene, precision: Precision, pose: Pose | None = None) -> None:
         model = scene.config.model.model_copy(update={"level": "full", "short_period": False})
@@ -426,7 +426,7 @@ def _nearest(scene: Scene, frame: Matrix) -> tuple[Matrix, tuple[int, ...]]:
 
 
 def _refuse_passing(scene: Scene, precision: Any, orbit: KeplerOrbit, found: Pose, here: PoseMotion) -> None:
-    """Refuse loads that don't rest in the turning frame, and states beside the rotation that do not."""
+    """Refuse loads that don't rest in the turning frame, and other states that do not."""
     context, n, least = scene.context, orbit.mean_motion, scene.context.mpf(_RESTS)
     seconds = 2 * context.pi / n * context.mpf(_LATER)
     start = scene.start + seconds
@@ -596,7 +596,7 @@ def _return(search: SoughtReturn, pose: Pose) -> tuple[Pose, Matrix, int, Any]:
 
         newton = Newton(context, precision.bits - lost, residual, moved, 2 * count)
         try:
-            if level < (1 if swift else 2):  # in more digits those of a narrower one's are enough
+            if level < (1 if swift else 2):  # in more digits a narrower one's are enough
                 known, sure = newton.slope(pose), newton.uncertainty
             pose = newton.settled(pose, known)
         except (NoEquilibrium, ZeroDivisionError):

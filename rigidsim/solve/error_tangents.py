@@ -274,7 +274,7 @@ class Held:
 
 
 class ErrorTangents:
-    """Motions and the tangents beside each of them: ``time`` is what was reached, (motions,), and ``spread``
+    """Motions and the tangents of each: ``time`` is what was reached, (motions,), and ``spread``
     what was seen. The random draws are the same for all motions and each time, so that results don't depend
     on the company.
 

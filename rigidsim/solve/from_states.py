@@ -147,7 +147,7 @@ class FromStates(AnyStart):
         """Derivatives (rows, states) by time (s) of states in internal units.
 
         Args:
-            added: angular accelerations (rows, 3), rad/s^2, body axes, beside the equations' own.
+            added: angular accelerations (rows, 3), rad/s^2, body axes, added to the equations'.
         """
         found = evaluate_rows(self._derivatives, states, times=self._internal(times)).T
         found = self._internal(found)

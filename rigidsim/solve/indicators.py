@@ -12,7 +12,7 @@ With d(t) the length of a tangent vector over its initial one and g = ln d (obse
 The mean of Y tends to 2 for quasi-periodic motion and grows like half the largest exponent times T in chaos.
 By parts, int t g' dt = t g(t) - int g dt, so that no derivative of g is needed; the integrals are taken by
 the trapezoid rule over the samples, added in their order: ``sum`` would add those of a single motion in
-another order than those of many, and a member's bits would depend on who is beside it. Several samples a
+another order than those of many, and a member's bits would depend on its neighbours. Several samples a
 period make the value good to a few per cent; to separate order from chaos one an orbit will do.
 """
 

@@ -191,7 +191,7 @@ class BatchEngine:
             np.arange(count) // self.width, np.flatnonzero(~np.isfinite(there).all(axis=(1, 2)))
         )
         for lane in np.flatnonzero(stopped).tolist() if count > 1 else ():
-            only = [lane]  # those beside one that was lost go on alone
+            only = [lane]  # the others of a lost one go on alone
             found[:, only], times[only], taken[only] = self.onward(most_steps, *(x[..., only] for x in given))
         return found, times, taken
 

@@ -115,8 +115,8 @@ class InitialValueProblem:
 
 
 def prepare(experiment: Experiment, *, loads: Sequence[Load] = ()) -> InitialValueProblem:
-    """Work out an experiment, with loads of your own, up to its equations; a ConfigError says what was given,
-    what is allowed and where.
+    """Work out an experiment, with user-defined loads, up to its equations; a ConfigError says what was
+    given, what is allowed and where.
     """
     if experiment.config.sweep is not None:
         what = (
@@ -227,7 +227,7 @@ def _out_of_range(scene: Scene, error: OverflowError | ExpressionError) -> list[
 
 _NUTATES = 4
 """Times the body's own rate from which on the nutation by its wheels is so fast that rounded coefficients, by
-which the rates drift by eps a radian of it, show beside what steps round.
+which the rates drift by eps a radian of it, show among the rounding of steps.
 """
 
 

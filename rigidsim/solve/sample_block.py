@@ -98,7 +98,7 @@ class SampleBlock:
 def pack_angles(found: Sequence[AngleState]) -> np.ndarray:
     """One row for each: turns, chart, and the bits of the reference angles; (n, 0) without angle states.
 
-    Unfinished runs have been saved in this format before ``AngleState`` was a value of its own.
+    Unfinished runs have been saved in this format before ``AngleState`` was a separate value.
     """
     rows = [
         [*angles.turns, angles.chart, *np.array(angles.reference, dtype=np.float64).view(np.int64)]

@@ -99,7 +99,7 @@ class OwnErrors:
 class Stepper:
     """Takes single natural steps with dense output; no step is ever shortened for a sample.
 
-    One of your own defines ``time``, ``state``, ``step``, ``dense`` and ``back_to``, and keeps ``steps``,
+    A user-defined one defines ``time``, ``state``, ``step``, ``dense`` and ``back_to``, and keeps ``steps``,
     ``smallest`` and ``largest``. All bits must follow from what its marks hold.
 
     Attributes:

@@ -1,4 +1,4 @@
-"""A motion and tangents beside it: how small offsets of its states, and of its coefficients, go on.
+"""A motion and its tangents: how small offsets of its states, and of its coefficients, go on.
 
     y' = f(y, c),    d' = df/dy d + df/dc s
 

@@ -1,6 +1,6 @@
 """Atomic replacement of files and folders, so that none is ever seen half-written.
 
-New content is written under a hidden name beside its destination, which no other process uses, synced to
+New content is written under a hidden name next to its destination, which no other process uses, synced to
 disk and then renamed; so a file with its final name is whole, whatever kills the process or fills the disk.
 """
 
@@ -15,7 +15,7 @@ from typing import Any
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary path beside ``path`` for a file that replaces it when the block ends without an error."""
+    """A temporary path next to ``path`` for a file that replaces it when the block ends without an error."""
     path.parent.stat()  # a missing parent folder is reported before the work is done
     temporary = _hidden(path, "partial")
     try:

@@ -271,7 +271,7 @@ def rows_in(file: h5py.File) -> h5py.Group:
 
 
 def add_extras(file: NetcdfFile, extras: Sequence[Extra]) -> None:
-    """Write variables with dimensions of their own."""
+    """Write variables with separate dimensions."""
     for extra in extras:
         for dim, size in zip(extra.dims, extra.values.shape, strict=True):
             file.dimension(dim, size)

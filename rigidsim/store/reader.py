@@ -53,7 +53,7 @@ def open_dataset(
         decoded: whether dates become dates; otherwise every variable is as it is stored.
 
     Returns:
-        Values beyond double precision have residuals beside them, see ``parts_of_values.parts_in``.
+        Values beyond double precision have residuals next to them, see ``parts_of_values.parts_in``.
 
     Raises:
         RunFolderError: a file is damaged, foreign, of another schema version, or lacks what it declares.

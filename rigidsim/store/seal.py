@@ -85,7 +85,7 @@ def check_whole(path: Path) -> tuple[str, str]:
 
 
 def refuse_damaged(path: Path, expected: str | None) -> None:
-    """Check a run's complete dataset against its seal, and against the SHA-256 that the summary beside it
+    """Check a run's complete dataset against its seal, and against the SHA-256 that the summary next to it
     gives, if any.
     """
     _, digest = check_whole(path)

@@ -52,7 +52,7 @@ def first_of(error: ValidationError) -> str:
 
 
 ENGINE = "engine"
-"""Key beside the phases in ``Cost.seconds``: time that the engine alone took of integrating and recording."""
+"""Key next to the phases in ``Cost.seconds``: the engine's share of integrating and recording."""
 
 
 class UnmeasuredCode(Enum):
@@ -173,7 +173,7 @@ class TableErrors(SummaryPart):
 
 
 class ModellingWindow(SummaryPart):
-    """A window in which the full model ran beside a reduced one; see ``rigidsim.accuracy.modelling``.
+    """A window in which the full model ran with a reduced one; see ``rigidsim.accuracy.modelling``.
 
     Attributes:
         momentum_axis, figure_axis: largest distances between both models' directions, with what averaging
@@ -445,7 +445,7 @@ class Summary(Brief, Understood):
         return [Caution(code, text) for code, text in zip(self.warning_codes, self.warnings, strict=True)]
 
     def warned(self, cautions: Iterable[Caution]) -> Self:
-        """A copy with these warnings in place of its own."""
+        """A copy with these warnings in place of the old ones."""
         return self.having(**as_fields(cautions))
 
 

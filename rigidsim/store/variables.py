@@ -89,7 +89,7 @@ def time_variable(parts: int) -> Variable:
 
 @dataclass(frozen=True)
 class Extra:
-    """A variable with dimensions of its own, small enough for memory; one named like its only dimension is a
+    """A variable with separate dimensions, small enough for memory; one named like its only dimension is a
     coordinate.
     """
 

@@ -362,7 +362,7 @@ def required_physics(
     )
     if write is not None:
         made = _recorded(without(experiment, least.left_out))
-        made = made.having([f'name="{config.name[:_LEAST]}-least"'])  # beside the full one's run
+        made = made.having([f'name="{config.name[:_LEAST]}-least"'])  # next to the full one's run
         with writing(Path(write)) as new:
             new.write_text(_comments(result) + made.text, encoding="utf-8")
     from rigidsim.look.figures.ladder import ladder_figure  # which loads matplotlib

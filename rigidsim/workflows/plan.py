@@ -172,7 +172,7 @@ class Predicted(SummaryPart):
 
     Attributes:
         pace: 1, or None if torques change the length of steps after the pilot's.
-        modelling_seconds: CPU time of the full model beside an averaged one.
+        modelling_seconds: CPU time of the full model next to an averaged one.
         free_bytes: free space on the disk; infinite if unknown.
         attitude_error_rad: None without an attitude, or if the method reports its own errors; ``held``:
             whether it is with projected invariants.
@@ -372,7 +372,7 @@ def plan(
 
 
 def _modelling_seconds(prepared: InitialValueProblem, levels: Sequence[LevelCost]) -> float:
-    """CPU time, s, of the full model beside an averaged run, as it was measured over the beginning."""
+    """CPU time, s, of the full model next to an averaged run, as it was measured over the beginning."""
     average = prepared.system.formulation.average
     if average is None or not prepared.scene.config.output.estimate:
         return 0.0

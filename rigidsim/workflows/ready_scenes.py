@@ -81,7 +81,7 @@ ALIASES: Mapping[str, str] = {
 
 
 def ready_folder() -> Path:
-    """Where the texts are: in the package as wheels have it, beside it in a clone."""
+    """Where the texts are: in the package as wheels have it, next to it in a clone."""
     package = Path(str(files("rigidsim")))
     packed = package / "configs"
     return packed if packed.is_dir() else package.parent / "configs"
@@ -111,7 +111,7 @@ def by_subject() -> Iterator[tuple[str, dict[str, str]]]:
 
 
 def write_new(scene: str, name: str | None = None, folder: Path = Path()) -> list[Path]:
-    """Write a scene as ``NAME.toml``, and beside it the files that it reads.
+    """Write a scene as ``NAME.toml``, and next to it the files that it reads.
 
     Args:
         scene: its name or an alias.
@@ -164,7 +164,7 @@ def _file_of(scene: str) -> Path:
 
 
 def _companions(config: Path) -> list[Path]:
-    """Files beside a config that it names as values."""
+    """Files next to a config that it names as values."""
     names = dict.fromkeys(text for text in texts_in(_parsed(config)) if re.fullmatch(r"\w[\w.-]*\.\w+", text))
     return [path for path in (config.parent / name for name in names) if path.is_file()]
 

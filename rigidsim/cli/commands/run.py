@@ -29,7 +29,7 @@ def run(
     read = [path for experiment in experiments for path in experiment.files]
     refuse_inputs([out / experiment.config.name for experiment in experiments], read)
     if scan:
-        from rigidsim.cli.commands import sweep as sweeps  # a room of its own
+        from rigidsim.cli.commands import sweep as sweeps  # a separate module
 
         return sweeps.run_scanned(experiments, scan, out, force=force, as_json=as_json)
     if member is not None:

@@ -116,7 +116,7 @@ def _plot(axes: Axes, dataset: xarray.Dataset, plot: Plot, *, dense: bool) -> No
 
 
 def _path(axes: Axes, path: PlanePath) -> None:
-    """Draw a path, a cross at the origin as its center, and what is beside it."""
+    """Draw a path, a cross at the origin as its center, and its surroundings."""
     style.trace(axes, *path.points.T, sparse=path.sparse)
     faint: dict[str, Any] = {"lw": 0.7, "alpha": 0.6, "zorder": 1, "sparse": path.sparse, "in_plane": True}
     for name, points in path.others.items():
@@ -293,7 +293,7 @@ def _curve_panel(
     figure: Figure, place: SubplotSpec, name: str, plot: Plot, shown: Shown, *, lowest: bool
 ) -> None:
     """Draw it over the whole run; of more swings than can be seen there as a band between the extremes, with
-    the first of them beside it.
+    the first of them next to it.
     """
     begins = shown.begins(name, plot)
     parts = place.subgridspec(1, 2, width_ratios=[1.7, 1.0], wspace=0.03) if begins else [place]

@@ -1,4 +1,4 @@
-"""A trajectory of another tool beside an experiment: attitude error, drifts and local defects along time."""
+"""A trajectory of another tool and an experiment: attitude error, drifts and local defects along time."""
 
 from __future__ import annotations
 

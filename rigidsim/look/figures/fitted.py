@@ -109,7 +109,7 @@ def _band(axes: Axes, dataset: xarray.Dataset, name: str, length: float) -> None
 
 
 def _above(axes: Axes, count: int) -> None:
-    """A key beside the title, where it hides nothing."""
+    """A key next to the title, where it hides nothing."""
     axes.legend(
         loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=count, handlelength=1.0, handletextpad=0.3,
         columnspacing=0.8, borderpad=0.1,

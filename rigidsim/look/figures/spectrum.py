@@ -77,7 +77,7 @@ def _draw(axes: Any, signal: xarray.Dataset, nyquist: float) -> None:
 
 
 def _limits(axes: Any, x: np.ndarray, real: bool) -> None:
-    """Set scale and limits that show all lines, and some of the curve beside them."""
+    """Set scale and limits that show all lines, and some of the curve next to them."""
     size, low, high = np.abs(x[x != 0]), float(x.min()), float(x.max())
     wide = len(size) > 1 and math.log10(size.max() / size.min()) > _FAST_DECADES
     if real and wide:

@@ -167,7 +167,7 @@ def _rank(dataset: xarray.Dataset, name: str) -> int:
 
 def _differs(dataset: xarray.Dataset, name: str) -> bool:
     """Whether a variable differs between members by more than rounding, and isn't rounding itself: a line or
-    a secular rate that is too small beside the signal that it was found in.
+    a secular rate that is too small compared with the signal.
     """
     variable, dims = dataset[name], _members(dataset)
     size = float(np.abs(variable).max())

@@ -16,9 +16,9 @@ from rigidsim.look.stages.parts import BODY, CENTRE, Array, Camera, Part, Stage,
 FIELD = np.deg2rad(55.0)  # field of view from bottom to top (rad), the viewer's own
 USUAL_VIEW = (float(np.deg2rad(24.0)), float(np.deg2rad(-55.0)))
 """Elevation and azimuth (rad) of the eye where nothing asks for another."""
-NEAR = 6.0  # reaches: a body that moves further gets a track view of its own
+NEAR = 6.0  # reaches: a body that moves further gets a separate track view
 ORIGIN = "origin"
-DISTANT = 30.0  # extents from the origin, beyond which the picture has an origin of its own
+DISTANT = 30.0  # extents from the origin, beyond which the picture has a separate origin
 _WEAK = 1e-3  # of the strongest tide
 _SUN, _MOON = 0.11, 0.07  # radii of the balls that stand for sources, in radii of the globe
 TRACK_BODY = 0.08  # reach of the enlarged body in the track view

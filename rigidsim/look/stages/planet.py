@@ -2,7 +2,7 @@
 its disc as its source sees it.
 
 If no attitude is known but an axis is (in an averaged model, which has no rotation), a body is drawn that
-points there and doesn't turn; a body of which nothing else is known has a stage of its own. The frame of the
+points there and doesn't turn; a body of which nothing else is known has a separate stage. The frame of the
 disc turns with the direction to the source, and the mean figure axis is up. It is stretched along the line of
 sight, so that the eye sees all that is seen from far away, to the limb: librations are its wobble.
 """

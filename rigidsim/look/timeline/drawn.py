@@ -55,7 +55,7 @@ _FAINT: Color = (90, 96, 108)
 LEGEND_COLUMNS = 3
 LEGEND_LINE = 0.78
 """Height of a line of the legend, which is 30 units wide: about 24 of 950 points of the screen."""
-MOST_LEADING = 3  # plots beside the scene
+MOST_LEADING = 3  # plots next to the scene
 CHUNK = 4096  # rows per chunk: larger ones make the viewer slow, smaller ones heavy
 
 

@@ -203,7 +203,7 @@ def write_comparison(
 
 
 def _named(run: DrawnRun, name: str, number: int) -> DrawnRun:
-    """A run under entities and titles of its own, with only its leading plots."""
+    """A run under separate entities and titles, with only its leading plots."""
     root, title = f"run{number}", legible(name)
     first = run.picture.stages[0]
     drawn = [
@@ -267,7 +267,7 @@ def build_blueprint(
     spaces: list[rrb.View | rrb.Container]
     spaces = [space_view(stage, run, narrow=narrow, titled=titled) for stage in stages]
     beside = [tabs([plane_view(plane) for plane in planes])] if planes else []
-    if facing and planes:  # the disc, and beside it where its source is seen, and how it moves in space
+    if facing and planes:  # the disc, next to it where the source is seen, and how it moves in space
         first, *others = map(plane_view, planes)
         spaces, beside = spaces[:1], [tabs([first, *spaces[1:], *others])]
     shares = [3.0] * len(spaces) + [2.6 if facing else 1.6] * len(beside)
@@ -300,7 +300,7 @@ def build_blueprint(
 def build_comparison(
     named: Sequence[tuple[str, DrawnRun]], clock: Clock, difference: Plot | None, *, bars: bool = True
 ) -> rrb.Blueprint:
-    """The layout for runs side by side on a common clock, each with one stage, under names of its own, and
+    """The layout for runs side by side on a common clock, each with one stage, under separate names, and
     the distances between their attitudes, if known; with the viewer's own ``bars`` or without.
     """
     runs = [run for _, run in named]
@@ -333,7 +333,7 @@ def build_comparison(
 def beside_plots(
     left: rrb.Container, right: Sequence[rrb.View | rrb.Container], heights: Sequence[float] | None = None
 ) -> rrb.Container:
-    """The scene with plots beside it, if there are any."""
+    """The scene with plots next to it, if there are any."""
     if not right:
         return left
     return rrb.Horizontal(left, rrb.Vertical(*right, row_shares=heights), column_shares=[5, 3.4])

@@ -147,7 +147,7 @@ def _ordered(context: Any, body: RigidBody, momentum: Vector, length: Any) -> tu
     return [moments[i] for i in picked], chosen, symmetric
 
 
-_MEANS = 40  # arithmetic-geometric means; each squares what is left
+_MEANS = 40  # arithmetic-geometric means; each squares the remainder
 
 
 @dataclass(frozen=True)
@@ -215,7 +215,7 @@ def means_needed(parameter: float, epsilon: float) -> int:
     for count in range(1, _MEANS):
         a, b = (a + b) / 2, math.sqrt(a * b)
         square, power = square * square / (16 * a * a), 2 * power
-        # what is left out is this term and terms that are smaller by its square
+        # this term is neglected, and terms that are smaller by its square
         if power * square < epsilon * parameter / 4:
             return count
     return _MEANS

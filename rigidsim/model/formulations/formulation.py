@@ -77,7 +77,7 @@ class Requirements:
     """Which states a scene requires."""
 
     attitude: bool
-    vertical: bool  # as three states of its own (Euler-Poisson equations)
+    vertical: bool  # as three states (Euler-Poisson equations)
     flight: bool
     record: list[str] | None  # names asked for, or None for everything that the scene has
     why: Mapping[str, str]  # what is carried: "rates", "attitude", "vertical", "flight"
@@ -109,14 +109,14 @@ class ModelPlan:
 class Formulation:
     """How the rotation of one scene is written in states; ``formulates`` registers a class of them.
 
-    One of your own needs an ``attitude``, whose derivatives follow from the body rates; all else has a
+    A user-defined one needs an ``attitude``, whose derivatives follow from the body rates; all else has a
     default. Numbers are exact (mpf, in the scene's arithmetic) until ``number`` rounds them once.
 
     Attributes:
         variables: what can be said of it for any scene.
-        carries_rates: whether the angular velocity is carried as three states with units of their own.
+        carries_rates: whether the angular velocity is carried as three states with separate units.
         resolves_rotation: whether every rotation is followed, rather than averaged over. A motion averaged
-            over has an error of its model, which is measured beside it.
+            over has an error of its model, which is measured.
         twin: formulation in which questions about the motion itself, such as its stability, are asked in
             double precision; None for this one.
         sequence: sequence of the Euler angles that are states; empty for other states.

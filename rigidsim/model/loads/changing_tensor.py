@@ -83,7 +83,7 @@ from rigidsim.scene.validation_messages import nearest
 
 _ELEMENTS = ("moment_x", "moment_y", "moment_z")
 _SLACK, _SLACK_SINGLE = 2.0**-40, 2.0**-16
-"""Part of their sum by which the moments of a flat body may break I1 + I2 >= I3, beside rounding."""
+"""Part of their sum by which the moments of a flat body may break I1 + I2 >= I3, plus rounding."""
 _TIMES = 512  # of a run's span, at which moments are looked at
 _DRIVEN_EACH, _PARTS = 32, (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0625, -0.0625)
 _MOST = 1e9  # ratio of moments past which no size is estimated
@@ -696,7 +696,7 @@ class Elasticity(Load, Carrier):
         return (spin + tide, 2 * spin) if self.spins else (tide, context.zero)
 
     def iterations(self, scene: Scene) -> int:
-        """Of the rate without delay, until what is left is less than rounding."""
+        """Of the rate without delay, until the remainder is less than rounding."""
         distorted, factor = self.shares(scene)
         if distorted > _LINEAR:
             raise fault(
@@ -765,7 +765,7 @@ class Elasticity(Load, Carrier):
     # --- as a carrier: of none but of energy ----------------------------------------------------------------
 
     def carried_at_start(self, scene: Scene) -> tuple[Vector, Any]:
-        """What the momentum exceeds I w by, and the energy beside w0 . M / 2."""
+        """What the momentum exceeds I w by, and the energy without w0 . M / 2."""
         tensor, momentum, bare = self.begun(scene)
         rates = scene.angular_velocity
         lost = [x - y for x, y in zip(rates, bare, strict=True)]

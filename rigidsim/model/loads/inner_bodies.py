@@ -140,7 +140,7 @@ class Rotor(Load):
     # --- its momentum ---------------------------------------------------------------------------------------
 
     def starting_momentum(self, scene: Scene) -> Any:
-        """Momentum about its axis at the start, kg m^2/s: of a fixed one only what it has beside the body."""
+        """Momentum about its axis at the start, kg m^2/s: of a fixed one only relative to the body."""
         with_body = 0 if self.fixed else dot(self.axis, scene.angular_velocity)
         return self.moment * (self.rate + with_body)
 

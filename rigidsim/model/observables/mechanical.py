@@ -15,7 +15,7 @@ takes Z to the vertical.
 
     U = (1/2) sum s_k c_k . I c_k,  c_k = R^T d_k,  s_k = 3 G M_k / R_k^3     (MacCullagh),
 
-alone has two integrals beside the energy, for any sources (Bogoyavlensky, Commun. Math. Phys. 94, 1984, 255),
+has two integrals besides the energy, for any sources (Bogoyavlensky, Commun. Math. Phys. 94, 1984, 255),
 which follow from the Lax pair L(h) = h^2 J^2 + h M + V with J = (tr I) / 2 - I, V = R^T S R and
 S = sum s_k d_k d_k^T (Manakov's for S = 0):
 

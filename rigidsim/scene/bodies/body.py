@@ -275,7 +275,7 @@ class Body(Matter):
     @model_validator(mode="before")
     @classmethod
     def _whole_preset(cls, value: Any) -> Any:
-        """With what a preset says beside moments and mass."""
+        """With a preset's tables besides moments and mass."""
         preset = PRESETS.get(str(value.get("preset"))) if isinstance(value, dict) else None
         return preset.completed(value) if preset else value
 

@@ -6,7 +6,7 @@ into tetrahedra over its triangles; Grundmann & Moeller's rule of 15 points (197
 field to degree 4 (unnormalized coefficients; recursions of Cunningham 1970, Celest. Mech. 2, 207).
 Coordinates and sums are doubles.
 
-A link's inertia is about its centre of mass, in axes of its own: URDF's roll, pitch and yaw turn about fixed
+A link's inertia is about its centre of mass, in axes of the link: URDF's roll, pitch and yaw turn about fixed
 axes, MJCF's ``fullinertia`` is xx yy zz xy xz yz. Numbers keep the digits of the file.
 """
 
@@ -34,13 +34,13 @@ _DEGREES = (3, 4)
 _ROUNDING = 1e-14
 """Of sums over triangles: elements of a tensor and coefficients below it are zero by symmetry."""
 _VOLUME = 1e-9
-"""Volume over that of the bounding box below which nothing is enclosed."""
+"""Volume over the volume of the bounding box below which nothing is enclosed."""
 
 Refusal = Callable[[str], ConfigError]
 
 
 def is_mesh(name: str) -> bool:
-    """Whether a file's name is that of a mesh; others are texts of links."""
+    """Whether a file's name says mesh; others are texts of links."""
     return Path(name).suffix.lower() not in _XML
 
 

@@ -131,7 +131,7 @@ class GravityField:
 
 
 def asked_degree(table: GravityFieldTable, loads: Iterable[Any], sweep: Any = None) -> int:
-    """The degree to which a file is read: the one beside it, or the highest that a load asks for, or a sweep
+    """The degree to which a file is read: the key next to it, or the highest that a load asks for, or a sweep
     over a load's.
     """
     if table.degree is not None:

@@ -149,7 +149,7 @@ def _of(table: SurfaceTable, place: str, center_of_mass: Vector, context: Any) -
 def with_surfaces(
     drawing: list[dict[str, Any]], tables: Sequence[SurfaceTable] | None, found: Sequence[OuterSurface]
 ) -> list[dict[str, Any]]:
-    """Solids for pictures of a body with these surfaces, as plain JSON values: beside known solids the plates
+    """Solids for pictures of a body with these surfaces, as plain JSON values: with known solids the plates
     alone, else all surfaces in the place of a body of which only the moments are known.
 
     Of a plate the outline isn't known: it is drawn as a square. With ``one_sided`` its back has no part.

@@ -65,7 +65,7 @@ class Preset:
         """``[body]`` as given, with this preset's tables where it says nothing else.
 
         Keys of a table count one by one: ``core = {friction = 0}`` keeps the rest of the core. A gravity
-        field with a radius or a file of its own is another one.
+        field with a radius or a file is another one.
         """
         found = dict(given)
         for name, table in self.tables.items():

@@ -51,7 +51,7 @@ class Readable:
         turns: whether it is an angle that is continued over full turns.
         jumps: what to do about it, if it isn't continuous: no event can read it then.
         long: whether its expression is too long to be compiled unrolled.
-        formula: what it is written out as, in terms of ``parts``, if it has kinks or jumps of its own.
+        formula: what it is written out as, in terms of ``parts``, if it has kinks or jumps.
     """
 
     name: str

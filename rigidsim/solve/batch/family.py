@@ -332,7 +332,7 @@ class Families:
         return np.setdiff1d(waiting, take(candidates), assume_unique=True) if len(candidates) else waiting
 
     def _join(self, family: Family, candidates: np.ndarray) -> np.ndarray:
-        """Sort those of some members of a kind that share a family's equations; returns these."""
+        """Sort members of a kind that share a family's equations; returns these."""
         family.context.begin(self._members.columns(candidates), len(candidates))
         return self._sort_in(family, candidates)
 

@@ -16,7 +16,7 @@ Pair = tuple[Any, Any]
 
 
 class Digits:
-    """Arithmetic in mpmath, in a context of its own; times are mpf."""
+    """Arithmetic in mpmath, in a separate context; times are mpf."""
 
     def __init__(self, context: Any) -> None:
         self._context = context

@@ -1,4 +1,4 @@
-"""How the methods of ``[integrator] method`` solve a scene: a registry, which one of your own can enter."""
+"""How the methods of ``[integrator] method`` solve a scene: a registry, open to user-defined methods."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Unsuitable(ValueError):
 class Algorithm:
     """How a method solves one scene; ``solves`` registers it.
 
-    One of your own needs a ``stepper``; all else has a default.
+    A user-defined one needs a ``stepper``; all else has a default.
 
     Attributes:
         method: what can be said of it for any scene.
@@ -32,7 +32,7 @@ class Algorithm:
         sets_parameters: whether its stepper sets parameters of equations that change at surfaces or times.
         takes_series: whether its steps are Taylor series, which a root of zero at the start has none of.
         own_errors: whether it reports its errors itself (``Stepper.errors``), or has none; if not, they
-            are estimated from motions that begin beside its own, in heyoka's rounding.
+            are estimated from motions that start near it, in heyoka's rounding.
         form: the closed form that gives the states; None if none does.
     """
 

@@ -117,7 +117,7 @@ class SurfaceFunctions:
         return np.array([values, _RATE_ROUNDINGS * self._epsilon * sizes])
 
     def beside(self, state: np.ndarray, time: Scalar, pars: np.ndarray, j: int) -> float:
-        """A size well above an argument's rounding, which is added to its event beside its zero."""
+        """A size well above an argument's rounding, which is added to its event next to its zero."""
         found, place = self._often(state, pars=pars, time=time), self._ends[1] + j
         noise = max(_ROUNDINGS * float(found[place + self._surfaces]), _LEAST)
         return 2 * abs(float(found[place])) + self._epsilon * noise

@@ -15,7 +15,7 @@ the motion is on. Then no cooldown is needed, and a boundary holds all that late
 Surfaces that depend on time alone are crossed at moments known as written, where steps end
 (``rigidsim.solve.switching.moments``). The turns of angles and the sign of the quaternion, where an
 expression depends on them, are parameters of the equations, continued from step to step; along surfaces the
-motion has equations of its own, compiled when they are first needed. Both take single steps.
+motion has separate equations, compiled when they are first needed. Both take single steps.
 """
 
 from __future__ import annotations
@@ -183,7 +183,7 @@ class SwitchingStepper(TaylorStepper):
 
     def settle(self) -> None:
         """Must be called after the state was set from outside: takes the sides on which it lies."""
-        # the state lies beside surfaces that it slid along
+        # the state lies next to surfaces that it slid along
         self._modes = [mode or 1 for mode in self._modes]
         self._take_known_sides()
         self._agree()

@@ -1,1 +1,1 @@
-"""Another tool's trajectory beside an experiment: conventions, errors, local defects, and what they mean."""
+"""Another tool's trajectory and an experiment: conventions, errors, local defects, and what they mean."""

@@ -1,4 +1,4 @@
-"""A trajectory's file as a run, without an experiment beside it: to be viewed, plotted and analysed.
+"""A trajectory's file as a run, without an experiment: to be viewed, plotted and analysed.
 
 Its convention is the one in which the attitude turns at the rates that the file has. Without rates only what
 names or matrices say by themselves is taken; the rest is refused, and ``compare`` finds it.

@@ -1,4 +1,4 @@
-"""``rigidsim compare``: another tool's trajectory beside an experiment, at its own times."""
+"""``rigidsim compare``: another tool's trajectory and an experiment, at the file's times."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class Disagreement(SummaryPart):
 
 
 class Comparison(SummaryPart):
-    """A trajectory of another tool beside an experiment.
+    """A trajectory of another tool compared with an experiment.
 
     Attributes:
         verdict: agrees, integration_error, wrong_model, inconsistent_rates or undecided.

@@ -1,4 +1,4 @@
-"""Local defects of a trajectory: where the experiment's equations lead from a row, beside where it goes.
+"""Local defects of a trajectory: where the experiment's equations lead from a row, and where it goes.
 
 Kinematics separates a wrong model from a loose integrator. Whatever torques act and whatever the moments
 of inertia are, the attitude is the integral of the angular velocity. So a motion of other equations, exactly

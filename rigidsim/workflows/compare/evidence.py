@@ -1,4 +1,4 @@
-"""What a trajectory shows beside the experiment, and what it means.
+"""What a trajectory shows against the experiment, and what it means.
 
 Errors, drifts of invariants and local defects are measured. Then a verdict is given, in this order: its
 attitudes are the experiment's or not. They turn at its rates or not. Where the attitudes are others, its
@@ -62,7 +62,7 @@ _AGREE = 10.0  # times the attitude's floor per radian of the motion, that rates
 
 
 class Evidence:
-    """A trajectory in a convention beside the experiment's motion; what costs time is worked out when needed.
+    """A trajectory in a convention with the experiment's motion; what costs time is worked out when needed.
 
     Attributes:
         times: (rows,), s; over the ``span``, s. quaternions: (rows, 4), w x y z, body to space axes.
@@ -192,7 +192,7 @@ class Evidence:
     @cached_property
     def local(self) -> tuple[np.ndarray, np.ndarray, np.ndarray | None] | None:
         """Rows that local defects begin at, the attitude's (rad) to the next rows, and the rates' (rad/s);
-        without rates those of the shortest windows. None where rows are too far apart.
+        without rates from the shortest windows. None where rows are too far apart.
         """
         if self.states is None:
             return None

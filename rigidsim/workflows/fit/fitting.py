@@ -487,7 +487,7 @@ def _finite(value: float) -> float | None:
 
 
 def fitted_run(experiment: Experiment, fit: xarray.Dataset, source: str = "memory") -> ShownRun:
-    """Run a fitted experiment at the times of its fit's dataset, and put the predicted covariance beside it.
+    """Run a fitted experiment at the times of its fit's dataset, and store the predicted covariance with it.
 
     Args:
         experiment: with the estimated values. fit: the fit's dataset.
@@ -498,7 +498,7 @@ def fitted_run(experiment: Experiment, fit: xarray.Dataset, source: str = "memor
     asked = experiment.config.output.record
     more = asked is not None and QUATERNION not in asked and _COVARIANCE in fit
     record = [*asked, QUATERNION] if more and asked else None
-    # without its own error, which would mislead beside the fit's
+    # without its own error, which would mislead next to the fit's
     made = sampled(experiment, fit["time"].values.tolist(), record)
     found = made.dataset
     if found.sizes["time"] != fit.sizes["time"]:

@@ -164,7 +164,7 @@ DataFiles = tuple[Path, ...]
 
 
 def folder_of(experiment: Experiment) -> Path:
-    """Where the data of a config lie: beside it, or in the working directory where it comes from no file."""
+    """Where the data of a config lie: next to it, or in the working directory if it comes from no file."""
     source = Path(experiment.source)
     return source.parent if source.is_file() else Path()
 
@@ -529,7 +529,7 @@ class FitKeys:
         return [*texts, f"initial.quaternion=[{shown_values}]"]
 
     def experiment(self, values: Sequence[float] | np.ndarray, base: Experiment) -> Experiment:
-        """An experiment at other values, without a text of its own: for runs that nobody keeps."""
+        """An experiment at other values, without a text: for runs that nobody keeps."""
         varied = self._experiment.having(self.overrides(values), writes=False)
         return replace(base, config=varied.config)
 
@@ -676,7 +676,7 @@ class ByDifferences:
 
 
 class ByTangents:
-    """Variational equations beside the motion, compiled once for all values: side by side where a motion
+    """Variational equations with the motion, compiled once for all values: side by side where a motion
     allows it, otherwise one step after the other.
     """
 

@@ -706,7 +706,7 @@ def get_ready(config: str, source: str) -> None:
 
 
 def single_member(experiment: Experiment, member: int) -> Experiment:
-    """A member of a config's ``[sweep]`` as a run of its own, named after the sweep and its number."""
+    """A member of a config's ``[sweep]`` as a separate run, named after the sweep and its number."""
     sweep = Sweep.of(experiment)
     if not 0 <= member < sweep.count:
         what = f"given {member}; its members are 0 to {sweep.count - 1}, the last axis runs fastest"

@@ -50,7 +50,7 @@ _ESTIMATED = 2.5  # cost ratio of a batch member with estimated errors to one wi
 def check_sweep(sweep: Sweep, *, most: float = math.inf) -> InitialValueProblem:
     """Refuse a sweep with a member that can't be run, by ``ConfigError`` with members and keys; returns the
     first that can, prepared. To check the numbers of more than ``_ALL`` takes a second per million members of
-    a product, most of a minute where each has values of its own. Of more than ``most`` members some are
+    a product, most of a minute where each has different values. Of more than ``most`` members some are
     checked.
     """
     _refuse_names(sweep)
