@@ -1,8 +1,8 @@
 """What pulls at a body: where sources are, how they are seen from it, and librations of one that faces one.
 
 For physical librations the normal is the axis of the figure axis's cone of precession, or the mean figure
-axis without precession. With phi the longitude of the node of the body's equator, theta its inclination and psi
-the angle from the node to the axis of least moment, the libration in longitude is phi + psi less its mean
+axis without precession. With phi the longitude of the node of the body's equator, theta its inclination and
+psi the angle from the node to the axis of least moment, the libration in longitude is phi + psi less its mean
 motion (it has no second order in theta), and those in latitude are theta and phi sin theta less theirs
 (Eckhardt 1981, The Moon and the Planets 25, 3: tau, rho and I sigma).
 """
