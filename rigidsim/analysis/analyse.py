@@ -9,7 +9,7 @@ import numpy as np
 import xarray
 
 from rigidsim.analysis.decomposition import amplitude_spectrum, at_nyquist, decompose
-from rigidsim.analysis.labels import Known, Label, label, reversed_label, settled
+from rigidsim.analysis.labels import SECULAR, Known, Label, label, reversed_label, settled
 from rigidsim.analysis.result import Analysis, SignalAnalysis, SpectralLine
 from rigidsim.analysis.signals import EquidistantTimes, Signal, clock_of, signals_of
 from rigidsim.errors import RigidsimError
@@ -18,6 +18,8 @@ from rigidsim.scene.parts_of_values import in_time_order
 SPECTRUM_POINTS = 4000
 _BLEND = 0.05  # bins by which a line can be off that has absorbed closer ones
 _SECULAR = "node_longitude.figure"
+_EQUINOX = "precession"
+_FIRST_ORDER = 0.03  # of the strongest line: weaker ones may as well be of second order in secular theory
 
 
 def analyse_dataset(
@@ -52,13 +54,17 @@ def analyse_dataset(
     fastest = max([fastest, *(abs(float(k.value)) for k in known), _largest_rate(dataset)])
     # twice, since a body of three moments moves at twice its own rate, too
     faster = not fastest or 2 * fastest > clock.nyquist
-    names = [k for k in _with_precession(known, found, clock) if float(k.value) != 0]
+    seen = list(found)
+    if any(k.kind for k in known) and _EQUINOX in dataset and not any(s.name == _EQUINOX for s in signals):
+        seen += [_decomposed(x, clock, lines, floor, order) for x in signals_of(dataset, [_EQUINOX])]
+    names = [k for k in _with_precession(known, seen, clock) if float(k.value) != 0]
     measured = [[(x.frequency, x.frequency_error, float(x.amplitude)) for x in one.lines] for one in found]
     in_body = [signal.in_body for signal in signals]
     names = settled(names, measured, in_body)
     return Analysis(
         signals=tuple(
-            _labelled(one, clock, names, faster, inside) for one, inside in zip(found, in_body, strict=True)
+            _labelled(one, clock, names, faster, inside, SECULAR.get(signal.variable, ()))
+            for one, inside, signal in zip(found, in_body, signals, strict=True)
         ),
         known=tuple(names),
         start=float(clock.start),
@@ -125,9 +131,14 @@ def _with_precession(
     """The known frequencies with the equinox's, unless known: it moves back with the measured precession.
 
     Where an axis follows the node of an orbit, its rate is that node's. Of samples that don't span 1.5
-    turns of the slowest known frequency no precession is reported: its rate is partly theirs.
+    turns of the slowest known frequency no precession is reported: its rate is partly theirs. With secular
+    frequencies of the planets it is ``k``, the rate at which the equinox moves back along the moving orbit.
     """
     names = list(known)
+    if any(k.kind for k in known):
+        turning = [one for one in signals if one.name == _EQUINOX and one.rate is not None]
+        why = "secular rate of precession"
+        return [*(Known("k", -one.rate, 0.0, why, one.rate_error, kind="k") for one in turning), *names]
     if not known or any(k.name == "precession" for k in known) or _slow(known, clock):
         return names
     for one in signals:
@@ -148,10 +159,22 @@ def _largest_rate(dataset: xarray.Dataset) -> float:
 
 
 def _labelled(
-    found: SignalAnalysis, clock: EquidistantTimes, known: Sequence[Known], faster: bool, in_body: bool
+    found: SignalAnalysis,
+    clock: EquidistantTimes,
+    known: Sequence[Known],
+    faster: bool,
+    in_body: bool,
+    secular: Sequence[str],
 ) -> SignalAnalysis:
     """The analysis with labels of its lines, and notes."""
-    lines = [replace(_named(x, found.real, clock, known, in_body), faster=faster) for x in found.lines]
+    weakest = _FIRST_ORDER * max((line.amplitude for line in found.lines), default=0.0)
+    lines = [
+        replace(
+            _named(x, found.real, clock, known, in_body, secular if x.amplitude >= weakest else ()),
+            faster=faster,
+        )
+        for x in found.lines
+    ]
     blends = sum(
         abs(line.mismatch) >= 10 * plain.frequency_error
         for line, plain in zip(lines, found.lines, strict=True)
@@ -199,12 +222,17 @@ def _labelled(
 
 
 def _named(
-    line: SpectralLine, real: bool, clock: EquidistantTimes, known: Sequence[Known], in_body: bool
+    line: SpectralLine,
+    real: bool,
+    clock: EquidistantTimes,
+    known: Sequence[Known],
+    in_body: bool,
+    secular: Sequence[str],
 ) -> SpectralLine:
     """A line with its label, unfolded through that."""
     context, error, resolution = clock.context, line.frequency_error, 2 * math.pi / float(clock.length)
     place, blend = (float(line.observed), error, known, clock.nyquist), _BLEND * resolution
-    name = label(*place, real=real, in_body=in_body, blend=blend, resolution=resolution)
+    name = label(*place, real=real, in_body=in_body, blend=blend, resolution=resolution, secular=secular)
     turn = 2 * context.pi / clock.spacing
     frequency = line.observed + name.folds * turn
     # turning it by whole turns a sample changes nothing at the samples, but at the middle between two it does
@@ -234,4 +262,4 @@ def _wrapped(context: Any, angle: Any) -> Any:
 def _slow(known: Sequence[Known], clock: EquidistantTimes) -> list[Known]:
     """Known frequencies of which the samples span less than 1.5 turns."""
     most = 2 * math.pi * 1.5 / float(clock.length)
-    return [k for k in known if k.name != "precession" and 0 < abs(float(k.value)) < most]
+    return [k for k in known if k.name != "precession" and not k.kind and 0 < abs(float(k.value)) < most]

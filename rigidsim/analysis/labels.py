@@ -22,6 +22,7 @@ _ORDERS = {1: 60, 2: 40, 3: 16, 4: 10, 5: 8, 6: 7}
 _ARGUMENTS = ("l", "lp", "F", "D", "Om")  # of nutation, in the order of the tables (IERS Conventions 2010)
 _ALONE = re.compile(r"([+-])1(?=[A-Za-z])")
 _SIGMAS = 5.0
+_EXPECTED = 3.0  # sigmas of a line that theory expects
 _ROUNDING = 1e-13  # of a combination, relative to its largest term
 _CHANCE = 0.05  # labels that as many combinations would fit by chance aren't given
 _RIVALS = 2  # orders more that another combination may have and still make a label doubtful
@@ -36,6 +37,9 @@ class Known:
     a symmetric body has turned about its axis is to be seen in body axes alone.
 
     ``frames`` are rates (rad/s) of other frames in which its line may be seen, at its value plus such a rate.
+
+    ``kind`` of a secular frequency: g of a perihelion, s of a node, k of the equinox. Their combinations are
+    so many that only those of ``SECULAR`` are labels; of several that fit, the first ones known.
     """
 
     name: str
@@ -45,6 +49,16 @@ class Known:
     error: float = 0.0
     where: str = ""
     frames: tuple[float, ...] = ()
+    kind: str = ""
+
+
+SECULAR = {
+    "obliquity": ("ks",), "precession": ("ks",), "climatic_precession": ("kg",),
+    "orbit_eccentricity": ("gg",), "insolation": ("kg", "ks"),
+}  # fmt: skip
+"""First-order terms of variables, by the kinds of both frequencies: sums of k and another, differences of two
+g (Laskar et al. 2004, A&A 428, 261, equations 35 to 40).
+"""
 
 
 @dataclass(frozen=True)
@@ -105,45 +119,71 @@ def label(
     in_body: bool = False,
     blend: float = 0.0,
     resolution: float = math.inf,
+    secular: Sequence[str] = (),
 ) -> Label:
     """Find the combination that a line represents, observed within +-nyquist, rad/s.
 
     Where nothing fits within the error, combinations within ``blend``, far less than a bin, do: a line can
     have absorbed others that are too close to be separated. One whose error is about a bin gets no label.
     Where chance would fit as many combinations of all known frequencies, only frequencies below Nyquist's are
-    combined.
+    combined. ``secular`` are the kinds of terms that theory expects, whatever chance would fit.
     """
+    if (pairs := _pairs(known, secular)) is not None and _EXPECTED * error <= resolution:
+        return _fitting(pairs, frequency, error, known, nyquist, real, 0.0, expected=True)
     if _SIGMAS * error > resolution:
         return Label()
     if not known:
         return Label((), "0", 0) if abs(frequency) <= _SIGMAS * error else Label()
-    seen = [n for n, k in enumerate(known) if k.where in ("", "body" if in_body else "space")]
+    place = "body" if in_body else "space"
+    seen = [n for n, k in enumerate(known) if k.where in ("", place) and not k.kind]
     slow = [n for n in seen if abs(float(known[n].value)) < nyquist]
-    place = frequency, error, known, nyquist, real, blend
-    found = _fitting(seen, *place)
-    return found if found.multipliers or len(slow) in (0, len(seen)) else _fitting(slow, *place)
+    given = frequency, error, known, nyquist, real, blend
+    found = _fitting(_vectors(seen, len(known)), *given)
+    if found.multipliers or len(slow) in (0, len(seen)):
+        return found
+    return _fitting(_vectors(slow, len(known)), *given)
+
+
+def _vectors(seen: Sequence[int], count: int) -> NDArray[np.int64]:
+    """Combinations of the known frequencies of these numbers, among so many."""
+    vectors = np.zeros((len(combinations(len(seen))), count), dtype=np.int64)
+    vectors[:, seen] = combinations(len(seen))
+    return vectors
+
+
+def _pairs(known: Sequence[Known], secular: Sequence[str]) -> NDArray[np.int64] | None:
+    """Combinations of two secular frequencies of these kinds; None if there are none."""
+    unit = np.eye(len(known), dtype=np.int64)
+    found = [
+        unit[i] + (-unit[j] if first == second else unit[j])
+        for first, second in secular
+        for i, one in enumerate(known)
+        for j, other in enumerate(known)
+        if (one.kind, other.kind) == (first, second) and i != j
+    ]
+    return np.array(found) if found else None
 
 
 def _fitting(
-    seen: Sequence[int],
+    vectors: NDArray[np.int64],
     frequency: float,
     error: float,
     known: Sequence[Known],
     nyquist: float,
     real: bool,
     blend: float,
+    *,
+    expected: bool = False,
 ) -> Label:
-    """The combination of the known frequencies of these numbers that a line represents."""
-    vectors = np.zeros((len(combinations(len(seen))), len(known)), dtype=np.int64)
-    vectors[:, seen] = combinations(len(seen))
+    """Which of these combinations a line represents; chance counts unless they are expected."""
     values = np.array([float(k.value) for k in known])
     errors = np.array([math.hypot(k.error, abs(float(k.value)) * 2.0**-52) for k in known])
     true = vectors @ values
     turns = np.round(true / (2 * nyquist))
     observed = true - turns * 2 * nyquist
-    allowed: Reals = _SIGMAS * np.sqrt(error**2 + (vectors**2) @ errors**2) + _ROUNDING * np.max(
-        np.abs(vectors * values), axis=1
-    )
+    allowed: Reals = (_EXPECTED if expected else _SIGMAS) * np.sqrt(
+        error**2 + (vectors**2) @ errors**2
+    ) + _ROUNDING * np.max(np.abs(vectors * values), axis=1)
 
     def simplest(allowed: Reals, *, blended: bool) -> Label:
         """The simplest combination that fits; others of nearly the same simplicity make it doubtful."""
@@ -166,7 +206,7 @@ def _fitting(
         # as many equally simple combinations fit by chance, given their density here
         width: float = max(200 * float(allowed[best]), nyquist / 500)
         near = (np.abs(observed - frequency) <= width) & (np.abs(vectors).sum(axis=1) <= cost[0])
-        if max(int(np.count_nonzero(near)) - 1, 0) * float(allowed[best]) / width > _CHANCE:
+        if not expected and max(int(np.count_nonzero(near)) - 1, 0) * float(allowed[best]) / width > _CHANCE:
             return Label()
         rivals = [
             n

@@ -32,8 +32,9 @@ _IN_BODY = (
     "roll_pitch_yaw", "nadir",
 )  # fmt: skip
 FIRST = (
-    "polar_motion", "obliquity", "node_longitude", "libration", "roll_pitch_yaw", "tilt", "precession_angle",
-    "spin_angle", "figure_axis", "momentum_axis", "andoyer_angles", "wobble_angle", "nutation_angle",
+    "polar_motion", "obliquity", "climatic_precession", "orbit_eccentricity", "precession", "node_longitude",
+    "libration", "roll_pitch_yaw", "tilt", "precession_angle", "spin_angle", "figure_axis", "momentum_axis",
+    "andoyer_angles", "wobble_angle", "nutation_angle",
 )  # fmt: skip
 """Variables analysed by default; failing these the angular velocity, failing that all."""
 

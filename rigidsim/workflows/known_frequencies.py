@@ -5,6 +5,7 @@ ephemerides from mean elements, librations and a fluid core from the linearised 
 free core nutation to the wobble (Poincare 1910; Sasao, Okubo & Saito 1980).
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,6 +46,15 @@ _DELAUNAY = {
 """Arcsec a century: mean anomalies of Moon and Sun, argument of the Moon's latitude, elongation, node of date
 (Simon et al. 1994, A&A 282, 663; IERS Conventions 2010, equation 5.43).
 """
+_SECULAR = {
+    "g5": (4.257482, 1e-5), "g2": (7.453, 0.004), "g4": (17.916, 0.04), "g3": (17.368, 0.04),
+    "g1": (5.59, 0.04), "g6": (28.2449, 1e-3), "s3": (-18.848, 0.013), "s4": (-17.751, 0.04),
+    "s1": (-5.61, 0.04), "s2": (-7.06, 0.04), "s6": (-26.347841, 1e-3),
+}  # fmt: skip
+"""Arcsec a year: of the planets' perihelia (g) and nodes (s), La2010a (Laskar et al. 2011, A&A 532, A89,
+table 6), with a fifth of the most that they may change; the strongest in the Earth's orbit first.
+"""
+_SUN = 1.32712440041e20  # m^3/s^2
 _DELAUNAY_ERROR = 40.0  # arcsec a century: how much they change in a century
 
 
@@ -67,6 +77,7 @@ def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
     sources = [load.gradient_source for load in loads]
     if any(source is not None and source.placement.lunisolar for source in sources):
         found += _delaunay(scene)
+    found += _of_planets(scene, [source for source in sources if source is not None])
     alone = orbits[0] if len(orbits) == 1 == len(loads) else None
     librations = _librations(scene, alone, next((k.value for k in found if k.name == "Om"), None))
     if cored or elastic:  # whose own distortion changes the wobble
@@ -122,6 +133,20 @@ def _delaunay(scene: Scene) -> list[Known]:
     source = "mean elements of Sun and Moon (IERS Conventions 2010)"
     error = float(_DELAUNAY_ERROR * unit)
     return [Known(name, context.mpf(rate) * unit, 0.0, source, error) for name, rate in _DELAUNAY.items()]
+
+
+def _of_planets(scene: Scene, sources: list[Any]) -> list[Known]:
+    """Secular frequencies of the solar system, where an averaged body orbits the Sun by a table."""
+    tabulated = (s for s in sources if s.placement.elements()[1] is not None)
+    about_sun = any(abs(float(source.gravitational_parameter) / _SUN - 1) < 1e-3 for source in tabulated)
+    if not about_sun or scene.config.model.level != "orbit_averaged":
+        return []
+    unit = math.pi / 648000 / (_CENTURY / 100)
+    source = "secular frequencies of the planets (La2010a)"
+    return [
+        Known(name, rate * unit, 0.0, source, change * unit, kind=name[0])
+        for name, (rate, change) in _SECULAR.items()
+    ]
 
 
 def _of_rotation(scene: Scene) -> list[Known]:

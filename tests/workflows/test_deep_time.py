@@ -4,8 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 from scipy.integrate import solve_ivp
-from support import loaded
+from support import loaded, seeds
 
 import rigidsim
 from rigidsim.accuracy.reversal import there_and_back
@@ -154,6 +155,46 @@ def test_exports_of_what_a_run_has_not_are_refused(config: Path, tmp_path: Path)
             rigidsim.export(tmp_path / folder, name, tmp_path / "out", naming=named)
     with pytest.raises(rigidsim.RigidsimError, match="what its time 0 is"):
         rigidsim.export(tmp_path / "deep", "snvec", tmp_path / "out")
+
+
+LA2010 = {  # Laskar et al. (2011), arcsec a year
+    "g1": 5.59, "g2": 7.453, "g3": 17.368, "g4": 17.916, "g5": 4.257482, "g6": 28.2449, "s1": -5.61,
+    "s2": -7.06, "s3": -18.848, "s4": -17.751, "s6": -26.347841,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", seeds(2, 16))
+def test_lines_are_named_by_motions_of_perihelia_and_nodes(config: Path, seed: int) -> None:
+    rng, equinox = np.random.default_rng(seed), 50.4
+    years = np.arange(-4e6, 1, 4000.0)
+
+    def rate(words: str) -> float:
+        return sum(LA2010.get(x.lstrip("-"), equinox) * (-1 if x[0] == "-" else 1) for x in words.split())
+
+    def lines(names: list[str]) -> np.ndarray:
+        sizes, phases = 10 ** rng.uniform(-3, -2, len(names)), rng.uniform(0, 6, len(names))
+        angles = np.outer([rate(words) * ARCSEC for words in names], years) + phases[:, None]
+        return sizes @ np.cos(angles)
+
+    terms = {
+        "obliquity": ["k s3", "k s1", "k s6"],
+        "climatic_precession": ["k g5", "k g2", "k g4", "k g3", "k g6"],
+        "orbit_eccentricity": ["g2 -g5", "g4 -g5", "g3 -g5", "g3 -g2"],
+    }
+    found = {name: ("time", lines(names)) for name, names in terms.items()}
+    turned = -equinox * ARCSEC * years + 1e-3 * lines(["k s3"])
+    found["precession"] = ("time", turned, {"units": "rad"})
+    for strength, heavy in ((STRENGTH, False), (2 * STRENGTH, True)):
+        text = config.read_text().replace(str(STRENGTH), str(strength))
+        config.write_text(text)
+        run = rigidsim.run(rigidsim.load(config).replace({"time.samples": 2, "time.every": None}), out=None)
+        data = xarray.Dataset(found, {"time": years * YEAR}, run.dataset.attrs)
+        names = {
+            s.name: {line.label.text for line in s.lines} for s in rigidsim.analyse(data, list(terms)).signals
+        }
+        for name, found_names in names.items():
+            expected = {" + ".join(x.split()).replace("+ -", "- ") for x in terms[name]}
+            assert found_names - {""} == (set() if heavy else expected), name
 
 
 def test_keys_of_averages_are_refused_without_one(config: Path) -> None:
