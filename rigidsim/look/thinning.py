@@ -25,63 +25,99 @@ def thinned_indices(count: int, rows: int) -> NDArray[np.int64]:
 def thin(dataset: xarray.Dataset, rows: int) -> xarray.Dataset:
     """The rows of `thinned_indices`, in memory, of variables along time; residuals are left out.
 
-    They are read from `ROWS_AT_ONCE` rows of the file at a time: memory goes with `rows`, not with the run's
-    length. ``ValueError`` without a `time` dimension or coordinate, or see `thinned_indices`.
+    Memory goes with `rows`, not with the run's length. ``ValueError`` without a `time` dimension or
+    coordinate, or see `thinned_indices`.
     """
     return _thinned(dataset, rows, extremes=False)[0]
 
 
-def thin_with_extremes(dataset: xarray.Dataset, rows: int) -> tuple[xarray.Dataset, xarray.Dataset]:
+def thin_with_extremes(
+    dataset: xarray.Dataset, rows: int, known: "Thinning | None" = None
+) -> tuple[xarray.Dataset, xarray.Dataset]:
     """The rows of `thin`; and these with, of each component's values, the least and the largest of every two
     strides in turn, so that a fast motion keeps its amplitude as a curve. The first and the last row's values
-    are their own. All rows are read once, `ROWS_AT_ONCE` at a time. See `thin` for errors.
+    are their own. All rows are read once, `ROWS_AT_ONCE` at a time, but for `known` ones. See `thin` for
+    errors.
     """
-    return _thinned(dataset, rows, extremes=True)
+    return _thinned(dataset, rows, extremes=True, known=known)
 
 
-def _thinned(dataset: xarray.Dataset, rows: int, *, extremes: bool) -> tuple[xarray.Dataset, xarray.Dataset]:
+class Thinning:
+    """The rows and extremes of `thin_with_extremes`, of variables whose values arrive in pieces."""
+
+    def __init__(self, count: int, rows: int) -> None:
+        self._count, self._rows, self._columns = count, rows, dict[str, _Column]()
+
+    def add(self, name: str, values: NDArray[Any]) -> None:
+        """Take further rows (rows, ...) of a variable."""
+        if name not in self._columns:
+            self._columns[name] = _Column(self._count, self._rows, values)
+        self._columns[name].add(values)
+
+    def of(self, variable: xarray.Variable, name: str) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Its rows and extremes, time first; they are read from the variable unless they have arrived."""
+        if name not in self._columns:
+            piece = 2 * _stride(self._count, self._rows)
+            piece *= max(1, ROWS_AT_ONCE // piece)
+            for first in range(0, self._count, piece):
+                part = variable.isel(time=slice(first, min(first + piece, self._count)))
+                self.add(name, part.transpose("time", ...).values)
+        return self._columns[name].plain, self._columns[name].extremes
+
+
+class _Column:
+    """Those of one variable."""
+
+    def __init__(self, count: int, rows: int, like: NDArray[Any]) -> None:
+        self._last, self._stride, self._taken, self._rest = count - 1, _stride(count, rows), 0, like[:0]
+        self.plain = np.empty((len(thinned_indices(count, rows)), *like.shape[1:]), like.dtype)
+        self.extremes = np.empty_like(self.plain)
+
+    def add(self, values: NDArray[Any]) -> None:
+        """Take further rows; those after the last whole pair of strides wait."""
+        values, pair = np.concatenate([self._rest, values]) if len(self._rest) else values, 2 * self._stride
+        ends = self._taken + len(values) > self._last
+        whole = len(values) if ends else len(values) - len(values) % pair
+        part, self._rest, first = values[:whole], values[whole:].copy(), self._taken // self._stride
+        self._taken += whole
+        strided = part[:: self._stride]
+        self.plain[first : first + len(strided)] = strided
+        starts = np.arange(0, whole, pair)
+        for k, (quick, sure) in enumerate(((np.minimum, np.fmin), (np.maximum, np.fmax))):
+            room = self.extremes[first : first + len(strided)][k::2]
+            found = quick.reduceat(part, starts) if whole else part
+            room[...] = (sure.reduceat(part, starts) if np.isnan(found).any() else found)[: len(room)]
+        if ends:
+            self.plain[-1] = values[-1]
+            self.extremes[[0, -1]] = self.plain[[0, -1]]
+
+
+def _thinned(
+    dataset: xarray.Dataset, rows: int, *, extremes: bool, known: Thinning | None = None
+) -> tuple[xarray.Dataset, xarray.Dataset]:
     if "time" not in dataset.dims or "time" not in dataset.coords:
         raise ValueError("the dataset has no time coordinate: nothing to show along time")
     count = dataset.sizes["time"]
-    indices, stride = thinned_indices(count, rows), _stride(count, rows)
+    thinned_indices(count, rows)  # refuses what can't be
+    stride, thinning = _stride(count, rows), known or Thinning(count, rows)
     along = {str(n): v for n, v in dataset.data_vars.items() if "time" in v.dims and v.dtype.kind in "fiub"}
-    names = [name for name, variable in along.items() if "residual_of" not in variable.attrs]
+    wanted = dataset[[name for name, variable in along.items() if "residual_of" not in variable.attrs]]
+    # A slice is a strided read in HDF5; a list of indices would be read index by index.
+    ends = wanted.isel(time=slice(count - 1, count if (count - 1) % stride else 0))
     plain, shown = dict[Hashable, xarray.Variable](), dict[Hashable, xarray.Variable]()
-    for name, variable in dataset[names].variables.items():
+    for name, variable in wanted.variables.items():
         plain[name] = variable
         if "time" in variable.dims:
-            bounds: bool = extremes and stride > 1 and name in along and variable.dtype.kind == "f"
             dims = ("time", *(dim for dim in variable.dims if dim != "time"))
-            both = _values(variable, indices, stride, extremes=bounds)
+            if extremes and stride > 1 and name in along and variable.dtype.kind == "f":
+                both = thinning.of(variable, str(name))
+            else:
+                parts = (variable.isel(time=slice(None, None, stride)), ends.variables[name])
+                both = (np.concatenate([part.transpose("time", ...).values for part in parts]),) * 2
             plain[name], shown[name] = (xarray.Variable(dims, found, variable.attrs) for found in both)
     coords = [name for name in plain if name not in along]
     whole = xarray.Dataset(plain, attrs=dataset.attrs).set_coords(coords)
     return whole, xarray.Dataset(plain | shown, attrs=dataset.attrs).set_coords(coords) if extremes else whole
-
-
-def _values(
-    variable: xarray.Variable, indices: NDArray[np.int64], stride: int, *, extremes: bool
-) -> tuple[NDArray[Any], NDArray[Any]]:
-    """The values at indices, time first, and those or their extremes as in `thin_with_extremes`."""
-    count, others = variable.sizes["time"], [n for dim, n in variable.sizes.items() if dim != "time"]
-    plain = np.empty((len(indices), *others), variable.dtype)
-    shown = np.empty_like(plain) if extremes else plain
-    # A slice is a strided read in HDF5; a list of indices would be read index by index.
-    step, piece = 1 if extremes else stride, 2 * stride * max(1, ROWS_AT_ONCE // (2 * stride))
-    for first in range(0, count, piece):
-        part = variable.isel(time=slice(first, min(first + piece, count), step)).transpose("time", ...).values
-        strided = part[:: stride // step]
-        place = slice(first // stride, first // stride + len(strided))
-        plain[place] = strided
-        if extremes:
-            starts = np.arange(0, len(part), 2 * stride)
-            for k, (quick, sure) in enumerate(((np.minimum, np.fmin), (np.maximum, np.fmax))):
-                room, found = shown[place][k::2], quick.reduceat(part, starts)
-                room[...] = (sure.reduceat(part, starts) if np.isnan(found).any() else found)[: len(room)]
-    if indices[-1] % stride:
-        plain[-1] = variable.isel(time=-1).values
-    shown[[0, -1]] = plain[[0, -1]]
-    return plain, shown
 
 
 def _stride(count: int, rows: int) -> int:

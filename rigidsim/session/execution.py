@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -65,6 +65,9 @@ from rigidsim.store.summary import (
     as_fields,
 )
 from rigidsim.store.variables import Extra
+
+if TYPE_CHECKING:
+    from rigidsim.look.thinning import Thinning
 
 NEAR_SINGULAR = 1e-3
 """Singular factor below which Euler angles lose digits near their singularity."""
@@ -761,10 +764,17 @@ def _completed(
             last = folder.checkpoint, kept.packed(position), kept.events(position)
         unused = dataset.unused_variables(run.prepared, run.progress.steps)
         attributes = run.ended(summary)
-        writer.complete(folder.dataset, attributes, extras, unused=unused, checkpoint=last, conclude=conclude)
+        output, shown = run.prepared.scene.config.output, None
+        if output.timeline and writer.rows > output.timeline_rows:
+            from rigidsim.look.thinning import Thinning  # which loads xarray
+
+            shown = Thinning(writer.rows, output.timeline_rows)
+        writer.complete(
+            folder.dataset, attributes, extras,
+            unused=unused, checkpoint=last, conclude=conclude, watch=None if shown is None else shown.add,
+        )  # fmt: skip
         session.watch.next("dataset")
-        output = run.prepared.scene.config.output
-        summary = with_timeline(summary, folder, output, session.observer)
+        summary = with_timeline(summary, folder, output, session.observer, shown)
         if summary.timeline_sha256 is not None:
             session.watch.next("timeline")
     except KeyboardInterrupt:
@@ -780,8 +790,12 @@ def _completed(
     return summary
 
 
-def with_timeline(summary: Summary, folder: RunFolder, output: Output, observer: Observer) -> Summary:
-    """Draw a complete dataset's timeline, if requested; returns the summary with its digest."""
+def with_timeline(
+    summary: Summary, folder: RunFolder, output: Output, observer: Observer, shown: "Thinning | None" = None
+) -> Summary:
+    """Draw a complete dataset's timeline, if requested, of the rows shown, if they are known; returns the
+    summary with its digest.
+    """
     if not output.timeline or not summary.samples:
         return summary
     from rigidsim.look.timeline import write_timeline
@@ -791,7 +805,7 @@ def with_timeline(summary: Summary, folder: RunFolder, output: Output, observer:
     observer.phase("timeline")
     try:
         with open_dataset(folder.dataset, indexed=False) as found:
-            write_timeline(found, path, rows=output.timeline_rows)
+            write_timeline(found, path, rows=output.timeline_rows, known=shown)
     except (OSError, RuntimeError) as error:  # rerun raises its own on a full disk
         why = error.strerror if isinstance(error, OSError) else None
         raise StoppedWritingError(

@@ -9,7 +9,7 @@ import math
 import struct
 import sys
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import accumulate, pairwise
 from pathlib import Path
@@ -38,6 +38,9 @@ _STORED = 0.97  # share of its size that bytes keep if they aren't worth compres
 _SURVEY = 16  # chunks between which it is found out anew which bytes are
 Block = Mapping[str, Sequence[np.ndarray]]
 """Float64 parts by variable name, each of shape (rows, components)."""
+
+
+Watch = Callable[[np.ndarray], None]
 
 
 class NetcdfFile:
@@ -128,10 +131,10 @@ def attribute(name: str, value: Any) -> str | np.ndarray:
 
 
 class ChunkedVariable:
-    """Fills a compressed variable with rows as they arrive, a whole chunk at once."""
+    """Fills a compressed variable with rows as they arrive, a whole chunk at once, which `watch` sees."""
 
-    def __init__(self, variable: h5py.Dataset) -> None:
-        self._variable = variable
+    def __init__(self, variable: h5py.Dataset, watch: Watch | None = None) -> None:
+        self._variable, self._watch = variable, watch
         self._chunk = np.zeros(variable.chunks)
         self._filled = self._written = self._stored = 0
 
@@ -153,6 +156,8 @@ class ChunkedVariable:
         """Write the rows that wait, as a chunk: all first bytes, all second bytes, ..., deflated."""
         if not self._filled:
             return
+        if self._watch is not None:
+            self._watch(self._chunk[: self._filled])
         self._chunk[self._filled :] = 0.0  # it has full size in the file however few rows there are
         octets = np.ascontiguousarray(self._chunk.view(np.uint8).reshape(-1, 8).T)
         if self._written % (_SURVEY * len(self._chunk)) == 0:

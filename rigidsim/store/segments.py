@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +92,11 @@ class SegmentWriter:
         return sum(len(block["time"][0]) for block in self._blocks)
 
     @property
+    def rows(self) -> int:
+        """All rows so far, saved or not."""
+        return self.saved_rows + self._rows
+
+    @property
     def due(self) -> bool:
         """Whether a segment is due: the collected rows are large, or the last segment is old."""
         large = self._rows * self._row_bytes >= self._limits.bytes
@@ -141,6 +147,7 @@ class SegmentWriter:
         unused: Collection[str] = (),
         checkpoint: tuple[Path, Arrays, Arrays] | None = None,
         conclude: Callable[[], None] = lambda: None,
+        watch: Callable[[str, np.ndarray], None] | None = None,
     ) -> int:
         """Stream all segments, and what is still in memory, into one compressed, sealed dataset.
 
@@ -151,16 +158,20 @@ class SegmentWriter:
             unused: variables that are zero throughout, and left out.
             checkpoint: where to leave a last checkpoint and all events, from which the run can be prolonged.
             conclude: writes everything else of a complete run; called before the segments are removed.
+            watch: sees all rows, by variable and in order, some thousands at once.
         """
         paths = segment_paths(self._folder)
         if len(paths) < self.count:  # rows that nothing fills would read as zeros
             raise RunFolderError(f"{self._folder}: segment {len(paths):08d}.h5 is missing")
-        rows = self.saved_rows + self._rows
+        rows = self.rows
         with self._writing(), atomic.replacing(target) as temporary:
             with sink(temporary) as target_file, netcdf.writing(target_file) as file:
                 wanted = [variable for variable in self._variables if variable.name not in unused]
                 created = netcdf.declare(file, wanted, rows, attributes, compressed=True)
-                chunks = {name: ChunkedVariable(variable) for name, variable in created.items()}
+                chunks = {
+                    name: ChunkedVariable(variable, watch and partial(watch, name))
+                    for name, variable in created.items()
+                }
                 for path in paths:
                     target_file.check()
                     _copy(path, chunks)

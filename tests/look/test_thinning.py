@@ -6,7 +6,7 @@ import xarray
 
 pytest.importorskip("matplotlib")
 
-from rigidsim.look.thinning import thin, thin_with_extremes
+from rigidsim.look.thinning import Thinning, thin, thin_with_extremes
 
 FAST = 0.039
 
@@ -33,3 +33,27 @@ def test_extremes_of_two_strides_stand_in_two_rows() -> None:
     np.testing.assert_array_equal(
         thin_with_extremes(part, 4001)[1]["angular_velocity"], part["angular_velocity"]
     )
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_rows_that_arrive_in_pieces_give_the_same(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(9, 3000))
+    rows = int(rng.integers(2, count // 2))
+    table = rng.standard_normal((count, 2))
+    table[rng.random((count, 2)) < 0.05] = np.nan
+    dataset = xarray.Dataset({"x": (("time", "k"), table)}, coords={"time": np.arange(count) / 7})
+    known = Thinning(count, rows)
+    for piece in np.array_split(table, np.sort(rng.integers(0, count, 5))):
+        known.add("x", piece)
+    both = (
+        thin_with_extremes(dataset, rows),
+        thin_with_extremes(dataset.assign(x=0 * dataset["x"]), rows, known),
+    )
+    for one, other in zip(*both, strict=True):
+        xarray.testing.assert_identical(one, other)
+    stride = max(1, -(-(count - 1) // (rows - 1)))
+    inner = both[0][1]["x"].values
+    for k in range(2, len(inner) - 2, 2):  # each pair of rows has the extremes of two strides
+        part = table[k * stride : (k + 2) * stride]
+        np.testing.assert_array_equal(inner[k : k + 2], [np.fmin.reduce(part), np.fmax.reduce(part)])

@@ -33,7 +33,7 @@ from rigidsim.look.stages.parts import (
     points_wide,
 )  # fmt: skip
 from rigidsim.look.stages.registry import build_picture
-from rigidsim.look.thinning import thin_with_extremes, thinned_indices
+from rigidsim.look.thinning import Thinning, thin_with_extremes, thinned_indices
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.readable import DAY, YEAR, TimeWords, epoch_of
 
@@ -172,9 +172,9 @@ class DrawnRun:
     pages: dict[str, str]
 
     @classmethod
-    def of(cls, dataset: xarray.Dataset, most: int) -> Self:
+    def of(cls, dataset: xarray.Dataset, most: int, known: Thinning | None = None) -> Self:
         """The drawing of at most so many rows of a dataset, possibly lazy, on the clock that suits them."""
-        rows, curves = (x.assign_attrs(dataset.attrs) for x in thin_with_extremes(dataset, most))
+        rows, curves = (x.assign_attrs(dataset.attrs) for x in thin_with_extremes(dataset, most, known))
         seconds = signals.seconds(rows)
         clock = dated(build_clock(seconds), epoch_of(rows.attrs))
         picture, _ = build_picture(rows)

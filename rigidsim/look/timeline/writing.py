@@ -27,6 +27,7 @@ from rigidsim.look.signals import title_of, values
 from rigidsim.look.solids import Array, Color
 from rigidsim.look.stages.parts import Stage, screen_seconds
 from rigidsim.look.stages.uncertainty import CONE
+from rigidsim.look.thinning import Thinning
 from rigidsim.look.timeline.drawn import (
     LEGEND_COLUMNS,
     LEGEND_LINE,
@@ -65,6 +66,7 @@ def write_timeline(
     rows: int = 100_000,
     part: str | None = None,
     height: float = PIXELS,
+    known: Thinning | None = None,
 ) -> int:
     """Write a dataset as a rerun recording with its own layout; returns the number of rows written.
 
@@ -76,13 +78,15 @@ def write_timeline(
     part: of the page that a picture shows, "page", "scene" or "plots", without the viewer's own bars;
     or "player", for a small frame within another page.
     height: of the picture, points of the screen, of which letters take as many on any.
+    known: the rows and extremes of its variables, as far as they needn't be read.
 
     Raises:
     ValueError: no samples, a time that isn't finite, `rows` < 2 or an unreadable `drawing`.
     RuntimeError: the environment variable RERUN switches recording off.
     OSError: the file can't be written, or there is no room for it.
     """
-    run = DrawnRun.of(in_time_order(dataset), rows)
+    ascending = in_time_order(dataset)
+    run = DrawnRun.of(ascending, rows, known if ascending is dataset else None)
     count = len(run.steps)
     with recording_to(
         path, title_of(dataset), count, build_blueprint(run, part=part, height=height)
