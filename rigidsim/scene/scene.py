@@ -499,10 +499,9 @@ def turning_inertia(context: Any, body: RigidBody, apart: Sequence[Matrix]) -> t
         moments, _ = eigen(context, [[plain(x) for x in row] for row in tensor])
         listed = ", ".join(context.nstr(x, 8) for x in moments)
         what = (
-            "given moments that the body's own tensor can't include: without the rotors' moments about their "
-            f"axes it would have the principal moments {listed} kg m^2, which no body has (all are positive, "
-            "and none is more than the sum of the others); make the rotors smaller, or add their tensors, "
-            "as of locked wheels, to the tensor of [body]"
+            "given moments that the body's tensor can't include: the tensor without the rotors has the "
+            f"principal moments {listed} kg m^2, which no body has (all must be positive, and none more than "
+            "the sum of the others); make the rotors smaller, or add the locked rotors to [body]"
         )
         raise ConfigError(Problem("[[rotors]] moment", what))
     return tensor, _inverse(context, tensor)

@@ -339,8 +339,8 @@ def _orientation_at(epoch: Epoch, known: bool) -> tuple[np.ndarray, float]:
         first, last = (date.fromordinal(_MJD_OF_DAY_0 + day) for day in ends)
         newer = "; a newer heyoka knows later ones" if tai > table[-1, 0] else ""
         raise ValueError(
-            f"the date {epoch} is outside what is known of the Earth's rotation, {first} to {last} (the "
-            f"IERS's table in heyoka{newer}); give the state in TEME or GCRF, which need none of it"
+            f"the date {epoch} is outside the IERS's table of the Earth's rotation, {first} to {last} (in "
+            f"heyoka{newer}); give the state in TEME or GCRF, which need no table"
         )
     after = int(np.clip(np.searchsorted(table[:, 0], tai), 1, len(table) - 1))
     low, high = table[after - 1], table[after]

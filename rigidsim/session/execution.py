@@ -227,8 +227,8 @@ class Diagnostics:
         if relative > UNCERTAIN:
             yield Caution(
                 WarningCode.MODEL_UNCERTAIN,
-                f'[model] level = "{found.level}" leaves the momentum\'s size or the energy uncertain by '
-                f"about {relative:.2g} of itself at the end; choose a less averaged level, or a nearer end",
+                f'[model] level = "{found.level}" leaves the momentum\'s norm or the energy uncertain by a '
+                f"fraction of about {relative:.2g} at the end; choose a less averaged level, or a nearer end",
             )
         worst, most = found.worst or 0.0, UNCERTAIN
         if asked is not None:  # of the axes, by whatever cause
@@ -413,10 +413,10 @@ def status_message(prepared: InitialValueProblem, progress: Progress, parts: Ass
         largest = prepared.system.states[int(np.argmax(np.abs(state[0].astype(np.float64))))]
         spacing = float(prepared.precision.epsilon) * abs(progress.time)
         text += (
-            f"; the largest state there was {largest}. What acts may change there within less than "
-            f"{spacing:.2g} s, to which {prepared.precision.name} precision resolves times, or exceed its "
-            "range (choose a higher precision, a wider change, or functions that stay small); or a norm may "
-            "vanish, and a root of zero has no series (add a small number under the root)"
+            f"; the largest state there was {largest}. A load may change there within less than "
+            f"{spacing:.2g} s, the resolution of time in {prepared.precision.name} precision, or exceed the "
+            "precision's range: choose a higher precision, a wider change, or smaller functions. Or a norm "
+            "vanishes, and a root of zero has no series: add a small number under the root"
         )
     return text
 

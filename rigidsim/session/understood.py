@@ -245,9 +245,9 @@ def _wasted_tolerance(scene: Scene) -> str:
         return ""
     name = integrator.precision if isinstance(integrator.precision, str) else f"{integrator.precision} digits"
     return (
-        f"[integrator] tolerance: given {context.nstr(given, 3)}, but in a precision of {name} each step "
-        f"rounds by about {epsilon:.3g}, so that a tolerance below {epsilon / 8:.3g} makes steps dearer and "
-        'no error smaller; choose "auto", or a higher precision for more digits'
+        f"[integrator] tolerance: given {context.nstr(given, 3)}, but in {name} each step rounds by about "
+        f"{epsilon:.3g}: a tolerance below {epsilon / 8:.3g} costs more and makes no error smaller; "
+        'choose "auto", or a higher precision for more digits'
     )
 
 

@@ -356,7 +356,7 @@ def _roots_of_zero(scene: Scene) -> list[Problem]:
             given = ", ".join(f"{name} = {context.nstr(values[name], 8)}" for name in read)
             what = (
                 f'"{expression.text}" has no finite derivative at the start ({given}), where its sqrt, '
-                "fractional power, asin or acos is at the end of its range, and no series leads on; start "
+                "fractional power, asin or acos is at the end of its range and has no series; start "
                 "elsewhere, write abs(u) for the norm of a single component u, or add a small number under "
                 "the root"
             )

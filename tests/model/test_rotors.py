@@ -241,7 +241,7 @@ def test_a_slender_satellite_with_a_damper_ends_in_a_flat_spin_as_explorer_1_did
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        (["rotors[0].moment=3"], "more than the body's own about this axis, 1.2"),
+        (["rotors[0].moment=3"], "more than the body's moment about this axis, 1.2"),
         (["rotors[0].moment=1.05"], "principal moments .* which no body has"),
         (["rotors[0].axis=[0, 0, 0]"], "a direction is needed"),
         (["rotors[0].fixed=true", 'rotors[0].torque="1"'], "given with fixed = true"),

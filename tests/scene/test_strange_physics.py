@@ -52,7 +52,7 @@ REFUSED = {
         'whose mass contains "earth" and "moon"; remove one of them',
     ),
     "a coefficient that no mass has": (lumps('C = {"3,0" = 50}'), 'given 50.0 as "3,0" in C (unnormalized)'),
-    "a source in the field's radius": (lumps('C = {"3,0" = 1e-6}', "1e9"), "within the radius of [body]"),
+    "a source in the field's radius": (lumps('C = {"3,0" = 1e-6}', "1e9"), "1e+06 km of [body]"),
     "friction without end": (orbit("core = {moment = 1e-3, friction = 1e10}"), "core.friction: given 1e+10"),
     "a pole beyond its theory": (
         figure(pole='"iau1976"').replace('"10 day"', '"9000 yr"'),

@@ -29,9 +29,7 @@ def test_a_tolerance_below_an_eighth_of_epsilon_is_warned_of(precision: str) -> 
         assert not told(f"{name}tolerance = {min(factor * EPSILON[precision], 1)!r}")
     for factor in (0.12, 1e-5):
         (text,) = told(f"{name}tolerance = {factor * EPSILON[precision]!r}")
-        assert (
-            f"a tolerance below {EPSILON[precision] / 8:.3g} makes steps dearer and no error smaller" in text
-        )
+        assert f"a tolerance below {EPSILON[precision] / 8:.3g} costs more and makes no error smaller" in text
         assert 'choose "auto", or a higher precision' in text
     assert not told(name + 'tolerance = "auto"')
 

@@ -155,7 +155,7 @@ _ADVICE = {
     AdviceCode.CLOSED_FORM: 'this scene has a closed form: method = "{code}" is right to {then} rad at '
     "any time, in place of {now}",
     AdviceCode.AVERAGED: '[model] level = "{level}" with short_period = true keeps the axes within {then} '
-    "rad of this at 1/{times} of the steps",
+    "rad of this run at 1/{times} of the steps",
 }
 
 

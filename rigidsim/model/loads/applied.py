@@ -285,8 +285,8 @@ class MassLoss(Load):
             ConfigError(
                 Problem(
                     self.rate.where,
-                    "given with uniform_gravity on a body that is held off its centre of mass, whose "
-                    "weight takes a constant mass; hold it at its centre of mass",
+                    "given with uniform_gravity on a body that turns about another point than its centre "
+                    "of mass: the weight needs a constant mass; use the centre of mass",
                 )
             ),
         )

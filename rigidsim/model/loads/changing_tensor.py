@@ -844,7 +844,6 @@ def _about_radius(body: Any, scene: Scene) -> Iterator[Caution]:
         number = f"{float(given):.10g}"
         yield Caution(
             WarningCode.LENGTH_WITHOUT_UNIT,
-            f"{WHERE} radius: given {number} without a unit, which is taken as m, while the body's mass "
-            "and moments suit as many km; write "
-            f'"{number} km" if that is meant, "{number} m" if not',
+            f"{WHERE} radius: given {number} without a unit, so in m; the body's mass and moments suit km: "
+            f'write "{number} km" if that is meant, "{number} m" if not',
         )

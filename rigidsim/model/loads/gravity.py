@@ -529,9 +529,9 @@ class BodyField(ByPlacedSource):
             far, radius = (length_text(float(plain(x))) for x in (near, field.radius))
             raise around.fault(
                 "degree",
-                f"given for a source that comes to {far} from the body's centre, within the radius of "
-                f"[body] gravity_field, {radius}, where its series doesn't hold; place it outside, or "
-                "leave degree out",
+                f"given for a source at {far} from the body's centre, within the radius {radius} of "
+                "[body] gravity_field, where the series doesn't hold; place the source outside, or leave "
+                "degree out",
             )
         return load.part(cls, field=field, degree=degree)
 

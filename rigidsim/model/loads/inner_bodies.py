@@ -106,9 +106,9 @@ class Rotor(Load):
         if moment > own:
             raise around.fault(
                 "moment",
-                f"given {context.nstr(moment, 8)} kg m^2, more than the body's own about this axis, "
-                f"{context.nstr(own, 8)} kg m^2, which includes the rotor as if it were locked; make it "
-                "smaller, or add the rotor's tensor to [body]'s",
+                f"given {context.nstr(moment, 8)} kg m^2, more than the body's moment about this axis, "
+                f"{context.nstr(own, 8)} kg m^2, which must include the locked rotor; make the rotor's "
+                "moment smaller, or add the rotor's tensor to [body]",
             )
         motor = None if fields.torque is None else around.expression("torque", fields.torque, "N m")
         size = norm(context, axis)
@@ -339,8 +339,8 @@ class FluidCore(Load):
             ConfigError(
                 Problem(
                     "[body] core",
-                    "given for a body that turns about another point than its centre of mass, about which "
-                    "a core would turn; remove reference or center_of_mass",
+                    "given for a body that turns about another point than its centre of mass, the centre "
+                    "of the core; remove reference or center_of_mass",
                 )
             ),
         )
@@ -369,8 +369,8 @@ class FluidCore(Load):
         if axis is None and flattening != 0 and moment != 0:
             raise _fault(
                 "flattening",
-                f"given {_text(flattening)}, but the body's two largest moments are equal, so that no "
-                "axis of largest moment is the core's; 0 is",
+                f"given {_text(flattening)}, but the body's two largest moments are equal, so that the "
+                "core has no axis of largest moment; 0 is allowed",
             )
         rate = None if table.angular_velocity is None else [x.at(context) for x in table.angular_velocity]
         axis = axis or unit_vectors(context)[2]
@@ -500,9 +500,9 @@ class FluidCore(Load):
             time, times = value_text(1 / damping, "s"), f"{float(damping / fastest):.2g}"
             yield Caution(
                 WarningCode.FRICTION_STIFF,
-                f"[body] core.friction: it takes the core to the mantle's rate in {time}, {times} times "
-                "as fast as anything turns, and steps are as short as that; without a core the motion "
-                "is nearly the same",
+                f"[body] core.friction: it brings the core to the mantle's rate in {time}, {times} times "
+                "as fast as anything turns, and steps are as short; without a core the motion is nearly "
+                "the same",
             )
 
     # --- what readers see --------------------------------------------------------------------------------
@@ -529,9 +529,9 @@ def _refuse_odd_mantle(core: FluidCore, body: RigidBody, context: Any) -> None:
     raise ConfigError(
         Problem(
             "[body] core",
-            f"given a moment of {context.nstr(plain(core.polar), 8)} kg m^2, which leaves the mantle the "
-            f"moments {listed} kg m^2, and no body has these (all are positive, and none is more than the "
-            "sum of the others); make the core smaller, or flatten it otherwise",
+            f"given a moment of {context.nstr(plain(core.polar), 8)} kg m^2, which leaves the mantle "
+            f"moments that no body has, {listed} kg m^2 (all must be positive, and none more than the sum of "
+            "the others); make the core smaller, or change its flattening",
         )
     )
 

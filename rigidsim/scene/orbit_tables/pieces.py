@@ -160,9 +160,9 @@ class TabulatedOrbit:
             i = int(doubtful[0])
             raise TableError(
                 f"rows {i + 1} and {i + 2}: the mean longitude is {float(abs(part[i])):.2f} turns off the "
-                f"{float(expected[i] / turn):.6g} turns of Kepler's third law between them, so that whole "
-                "turns can't be counted; give rows closer together, a column semi_major_axis, or period; "
-                "or leave the anomaly's column out for a mean longitude by Kepler's law"
+                f"{float(expected[i] / turn):.6g} turns of Kepler's third law, so whole turns can't be "
+                "counted; give closer rows, a column semi_major_axis, or period; or leave out the column of "
+                "the anomaly: the mean longitude then follows Kepler's law"
             )
         return np.concatenate([longitude[:1], longitude[0] + np.cumsum(expected + part * turn)])
 

@@ -289,9 +289,9 @@ def _agreement(seen: Evidence) -> Verdict | None:
         return AGREES, reason
     if seen.turn >= np.pi:
         return UNDECIDED, (
-            f"its attitudes are the experiment's, but from row to row the motion turns by "
-            f"{np.degrees(seen.turn):.3g} deg, so that other motions have the same rows; write more rows, or "
-            "angular velocities (wx wy wz) that agree"
+            f"its attitudes are the experiment's, but the motion turns by {np.degrees(seen.turn):.3g} deg "
+            "from row to row, so that other motions have the same rows; write more rows, or angular "
+            "velocities (wx wy wz) that agree"
         )
     return INCONSISTENT_RATES, (
         f"its attitudes are the experiment's, but they don't turn at its rates, which differ by "
