@@ -121,7 +121,7 @@ DECAYING = [  # of the same test cases: down within the hour
         (
             given(ITRF, "ITRF"),
             {"time": {"epoch": "2060-01-01 TT"}},
-            ["outside what is known", "1973-01-02", "newer heyoka"],
+            ["outside the IERS", "1973-01-02", "newer heyoka"],
         ),
     ],
 )

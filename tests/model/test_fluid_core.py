@@ -178,7 +178,7 @@ def test_by_default_it_turns_with_the_body() -> None:
     [
         ("moment = 1", "", "[body] core.moment: given 1; a part of the body's own"),
         ("moment = 0.1, flattening = 0.6", "", "[body] core.flattening: given 0.6; 0 to 0.5"),
-        ("moment = 0.9", "", "which leaves the mantle the moments"),
+        ("moment = 0.9", "", "which leaves the mantle moments"),
         ("moment = 0.1", 'integrator.formulation = "planar"', "carries angular momentum"),
         ("moment = 0.1", "body.center_of_mass = [0, 0, 1]", "turns about another point"),
     ],
