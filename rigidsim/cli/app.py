@@ -478,6 +478,15 @@ def export(
             "--object-id", "ID", "ID of the object in aem and oem; for ck and pck NAIF's: 301 or moon."
         ),
     ] = None,
+    message: Annotated[
+        str | None,
+        options.option(
+            "--message",
+            "KEY=VALUE,...",
+            "Of aem and apm: type=quaternion/angvel, sequence=zyx, from=body, time=UTC; of aem segment=1000 "
+            "(rows, or a time), of apm at=TIME.",
+        ),
+    ] = None,
     variable: Annotated[
         list[str] | None,
         options.option("--variable", "NAME", "Variable to export, along time; repeatable. Default: all."),

@@ -1,6 +1,6 @@
 """Datasets in other tools' formats."""
 
-FORMATS = ("csv", "parquet", "zarr", "aem", "oem", "ck", "pck", "snvec", "la2004")
+FORMATS = ("csv", "parquet", "zarr", "aem", "apm", "oem", "ck", "pck", "snvec", "la2004")
 """All formats."""
 
 FOR_SWEEPS = ("csv", "parquet", "zarr")

@@ -1,5 +1,8 @@
 """CCSDS messages of other programs, in KVN or XML: attitudes from body to space axes and rates along body
-axes (AEM of 504.0-B-1 and 504.0-B-2), the path in SI (OEM of 502.0-B). Covariances are passed over.
+axes (AEM and APM of 504.0-B-1 and 504.0-B-2), the path in SI (OEM of 502.0-B). Covariances are passed over.
+
+An APM is read as an AEM of one row: of its blocks the first that has an attitude counts, quaternion, Euler
+angles or spin, with its own rates or those of another block.
 
 Conventions of annex F of 504.0-B-2. The quaternion from frame A to frame B turns the axes of A into B's, so
 that it turns a vector's coordinates in B into coordinates in A; Euler angles from A to B are intrinsic turns;
@@ -23,7 +26,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from rigidsim.errors import RigidsimError
+from rigidsim.errors import RigidsimError, ensure
 from rigidsim.formats.digits import FEW, written_resolution
 from rigidsim.scene.epochs import SCALES, Epoch, parse_epoch
 from rigidsim.scene.rotations import rotation_matrix
@@ -46,6 +49,19 @@ MESSAGE_COLUMNS = {
 """Names of a message's columns by the variable that they are."""
 _STATES = {"AEM": "attitudeState", "OEM": "stateVector"}
 _UNITS = ("deg", "deg/s", "1/s", "s", "km", "km/s", "km/s**2")
+_BLOCKS = {
+    "QUAT": r"Q_\w+|Q[123C](_DOT)?", "EULER": r"EULER_\w+|[XYZ]_(ANGLE|RATE)|RATE_FRAME", "ANGVEL": "",
+    "SPIN": r"SPIN_\w+|NUTATION\w*",
+}  # fmt: skip
+"""Blocks of an APM, with the keywords of version 1, which has no marks around them in KVN."""
+_RENAMED = {f"{x}_FRAME_{letter}": f"REF_FRAME_{letter}" for x in ("Q", "EULER", "SPIN") for letter in "AB"}
+_RENAMED |= {f"{x}_DIR": "ATTITUDE_DIR" for x in ("Q", "EULER", "SPIN")}
+_ELEMENTS = {
+    "quaternionState": "QUAT", "eulerAngleState": "EULER", "eulerElementsThree": "EULER",
+    "angularVelocity": "ANGVEL", "spin": "SPIN", "eulerElementsSpin": "SPIN",
+}  # fmt: skip
+_STATED = {"QUAT": ("QUATERNION", "Q1"), "EULER": ("EULER_ANGLE", "ANGLE_1"), "SPIN": ("SPIN", "SPIN_ALPHA")}
+"""Attitudes of an APM by their blocks, in the order in which they are taken, and a keyword of each."""
 _MARKS = ("META_STOP", "DATA_START", "DATA_STOP")
 _ORBIT = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
 _ACCELERATION = ("X_DDOT", "Y_DDOT", "Z_DDOT")
@@ -137,9 +153,10 @@ class _Segment:
         return found
 
 
-def _segments(path: Path, kind: str) -> list[_Segment]:
+def _segments(path: Path, kind: str, text: str) -> list[_Segment]:
     """The segments with rows."""
-    text = path.read_text(encoding="utf-8-sig", errors="replace")
+    if kind == "APM":
+        return [_of_apm(text, path)]
     read = _of_xml if text.lstrip().startswith("<") else _of_kvn
     found = [segment for segment in read(text, kind, path) if segment.rows]
     if not found:
@@ -183,11 +200,7 @@ def _of_kvn(text: str, kind: str, path: Path) -> Iterator[_Segment]:
 
 def _of_xml(text: str, kind: str, path: Path) -> Iterator[_Segment]:
     count = 0
-    try:
-        every = list(ElementTree.fromstring(text).iter())
-    except ElementTree.ParseError as error:
-        raise RigidsimError(f"{path}: is no XML ({error}); write it again") from None
-    for message in every:
+    for message in _root(text, path).iter():
         if _tag(message) != kind.lower():
             continue
         version = _version(message.get("version", "0"), path)
@@ -201,6 +214,111 @@ def _of_xml(text: str, kind: str, path: Path) -> Iterator[_Segment]:
                     segment.rows.append((count, values.pop("EPOCH", ""), values))
                     count += 1
             yield segment
+
+
+def _of_apm(text: str, path: Path) -> _Segment:
+    """A segment of one row with the attitude of an APM, and the rates beside it."""
+    segment, blocks = _Segment(0.0, path, "the message", "row"), {name: dict[str, str]() for name in _BLOCKS}
+    blocks[""] = {}
+    read = _keys_of_xml if text.lstrip().startswith("<") else _keys_of_kvn
+    for block, key, value in read(text, segment):
+        name = _RENAMED.get(key, key)
+        if block and name in blocks[block]:
+            raise segment.fault(f"{key} is there twice; leave one of them")
+        blocks[block][name] = value
+    segment.version = _version(blocks[""].get("CCSDS_APM_VERS", ""), path)
+    euler = blocks["EULER"]
+    if any(f"{axis}_ANGLE" in euler for axis in "XYZ"):
+        segment.keys = euler
+        sequence = _ROTATIONS[segment.key("EULER_ROT_SEQ", _ROTATIONS, needed=True)].upper()
+        what = f"EULER_ROT_SEQ = {sequence}, of whose angles two would have one name; write a quaternion"
+        ensure(len(set(sequence)) == 3, segment.fault(what))
+        found = ((n, euler.get(f"{axis}_ANGLE")) for n, axis in enumerate(sequence, 1))
+        euler |= {f"ANGLE_{n}": angle for n, angle in found if angle is not None}
+    name = next((name for name, (_, first) in _STATED.items() if first in blocks[name]), "")
+    ensure(name, segment.fault("it has no attitude; a quaternion, Euler angles or a spin are needed"))
+    own, rates = blocks[name], _rates_of_apm(segment, name, blocks)
+    segment.keys = {**blocks[""], **own, **rates, "ATTITUDE_TYPE": _STATED[name][0] + rates.pop("", "")}
+    segment.rows = [(0, segment.keys.get("EPOCH", ""), {**own, **rates})]
+    return segment
+
+
+def _rates_of_apm(segment: _Segment, name: str, blocks: dict[str, dict[str, str]]) -> dict[str, str]:
+    """Rates beside the attitude of an APM, from whichever block, with the frame that they are along, and
+    under "" the end of the type.
+    """
+    own = blocks[name]
+    if name == "SPIN":
+        firsts = {"/NUTATION": "NUTATION", "/NUTATION_MOM": "MOMENTUM_ALPHA"}
+        return {"": next((kind for kind, first in firsts.items() if first in own), "")}
+    if f"{_STATED[name][1]}_DOT" in own:
+        return {"": "/DERIVATIVE"}
+    for rate, where, frame in (("ANGVEL", "ANGVEL", "ANGVEL_FRAME"), ("RATE", "EULER", "RATE_FRAME")):
+        given = blocks[where]
+        if _RATES[rate][0] not in given:
+            continue
+        ends = [
+            [one.get(f"REF_FRAME_{letter}", "").upper() for letter in order]
+            for one in (own, given)
+            for order in ("BA" if one.get("ATTITUDE_DIR", "").upper() == "B2A" else "AB",)
+        ]
+        what = f"rates from {' to '.join(ends[1])} beside an attitude from {' to '.join(ends[0])}; write both"
+        ensure(sorted(ends[0]) == sorted(ends[1]), segment.fault(f"{what} between the same frames"))
+        along = given.get(frame, "")
+        if re.fullmatch(r"(EULER|REF)_FRAME_[AB]", along.upper()):
+            along = given.get(f"REF_FRAME_{along[-1].upper()}", "")
+        found = {"": f"/{rate}", frame: along}
+        for key in _RATES[rate]:
+            text = given.get(key, "")  # the other frame turns the other way
+            found[key] = text if ends[0] == ends[1] else text[1:] if text[:1] == "-" else f"-{text}"
+        return found
+    return {"": ""}
+
+
+def _keys_of_kvn(text: str, segment: _Segment) -> Iterator[tuple[str, str, str]]:
+    """Block, keyword and value of each line of an APM; the block is empty for others than attitudes."""
+    inside = None
+    for number, line in enumerate(text.splitlines(), 1):
+        key, equals, value = (x.strip() for x in line.partition("="))
+        if not line.strip() or line.split()[0] in ("COMMENT", *_MARKS, "META_START"):
+            continue
+        if mark := re.fullmatch(r"(\w+)_(START|STOP)", key):
+            inside = (mark[1] if mark[1] in _BLOCKS else "") if mark[2] == "START" else None
+            continue
+        place = f"{segment.path}, line {number}"
+        if not equals:
+            raise RigidsimError(f'{place}: "{line.strip()[:60]}"; a keyword with = is allowed')
+        value, _, unit = value.partition("[")
+        old = (name for name, keys in _BLOCKS.items() if re.fullmatch(keys, key))
+        block = next(old, "") if inside is None else inside
+        if block and unit and unit.rstrip("] ").lower() not in _UNITS:
+            raise RigidsimError(f"{place}: {key} in [{unit}; allowed: {', '.join(_UNITS)}")
+        yield block, key.upper(), value.strip()
+
+
+def _keys_of_xml(text: str, segment: _Segment) -> Iterator[tuple[str, str, str]]:
+    """The same."""
+    message = _root(text, segment.path)
+    yield "", "CCSDS_APM_VERS", message.get("version", "0")
+    inside = set()
+    for element in message.iter():
+        if block := _ELEMENTS.get(_tag(element)):
+            inside |= set(element.iter())
+            segment.keys = {_tag(leaf): leaf.text or "" for leaf in element}
+            for key, value in _leaves(element, segment, 0):
+                if key == "EPOCH":
+                    yield "", key, value
+                elif key != "COMMENT":
+                    yield block, key, value
+        elif element not in inside and not len(element):
+            yield "", _tag(element), (element.text or "").strip()
+
+
+def _root(text: str, path: Path) -> ElementTree.Element:
+    try:
+        return ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise RigidsimError(f"{path}: is no XML ({error}); write it again") from None
 
 
 def _leaves(state: ElementTree.Element, segment: _Segment, number: int) -> Iterator[tuple[str, str]]:
@@ -322,9 +440,11 @@ class _AttitudeRows:
         readings = self._readings()
         if not readings or (len(readings) == 1 and self.kind != "SPIN"):
             return readings[0][1] if readings else None
+        if len(self.dates) == 1 and self.kind != "SPIN":  # by the standard
+            return readings[0][1]
         mismatches = [self._mismatch(rates) for _, rates in readings]
         best = min(mismatches)
-        if best > _GOOD:
+        if best > _GOOD and len(self.dates) > 1:
             kind = self.segment.key("ATTITUDE_TYPE")
             why = "the rows are too far apart to confirm them, or the attitude doesn't turn at them"
             self.notes.append(f"rates of {kind} were left out: {why}")
@@ -430,20 +550,23 @@ class _AttitudeRows:
         return attitude, rates * (2 / _RADIAN) if self.dots else rates
 
 
-def message_columns(path: Path, kind: str) -> dict[str, Any]:
+def message_columns(path: Path, kind: str, text: str | None = None) -> dict[str, Any]:
     """A message as what ``Trajectory`` is made of.
 
     Attitudes are unit quaternions from body to space axes, rates along body axes in deg/s, positions in m.
 
     Args:
-        kind: "AEM" or "OEM".
+        kind: "AEM", "APM" or "OEM".
+        text: the message, if it was read already.
 
     Raises:
         RigidsimError: something can't be read, with its line and what to do.
     """
-    segments = _segments(path, kind)
+    if text is None:
+        text = path.read_text(encoding="utf-8-sig", errors="replace")
+    segments = _segments(path, kind, text)
     epochs = [one.epochs() for one in segments]
-    reading: Any = _AttitudeRows if kind == "AEM" else _OrbitRows
+    reading: Any = _OrbitRows if kind == "OEM" else _AttitudeRows
     parts = [reading(*each) for each in zip(segments, epochs, strict=True)]
     notes = [note for part in parts for note in part.notes]
     for n, (before, after) in enumerate(pairwise(epochs), 1):
@@ -458,7 +581,7 @@ def message_columns(path: Path, kind: str) -> dict[str, Any]:
         raise RigidsimError(f"{path}: segments in different frames, {names}; write all in one")
     widths = [part.table.shape[1] for part in parts]
     table = np.concatenate([part.table[:, : min(widths)] for part in parts])
-    wanted = ("quaternion", "angular_velocity") if kind == "AEM" else ("position", "velocity")
+    wanted = ("position", "velocity") if kind == "OEM" else ("quaternion", "angular_velocity")
     columns = [name for variable in wanted for name in MESSAGE_COLUMNS[variable]][: min(widths)]
     if min(widths) < max(widths):
         notes.append("rates were left out, since not all segments have them")

@@ -22,6 +22,7 @@ class Naming:
         axes: the scene's space axes, as in ``[frame] axes``, or another name that sender and receiver agree
             on (capitals, digits and underscores); empty for the config's.
         object_name: name of the body; empty for the run's name.
+        message: options of attitude messages, by key: type, sequence, from, time, segment (AEM), at (APM).
     """
 
     epoch: str = ""
@@ -29,6 +30,7 @@ class Naming:
     object_name: str = ""
     object_id: str = ""
     center: str = "UNKNOWN"
+    message: Mapping[str, str] = field(default_factory=dict)
 
 
 def named_epoch(naming: Naming, attributes: Mapping[str, Any]) -> Epoch:
@@ -92,6 +94,7 @@ _PLACES = {
     "parquet": ("tables", "PARQUET", "pyarrow", "export"),
     "zarr": ("tables", "ZARR", "zarr", "export"),
     "aem": ("ccsds", "AEM", "", ""),
+    "apm": ("ccsds", "APM", "", ""),
     "oem": ("ccsds", "OEM", "", ""),
     "ck": ("spice", "CK", "spiceypy", "spice"),
     "pck": ("spice", "PCK", "spiceypy", "spice"),

@@ -196,7 +196,7 @@ def is_trajectory(path: Path) -> bool:
     suffix = path.suffix.lower()
     if suffix in _XARRAY:
         return not (path.parent / "dataset.h5").exists()
-    return suffix in {*TEXT, ".parquet", ".pq", ".aem", ".oem", ".xml"}
+    return suffix in {*TEXT, ".parquet", ".pq", ".aem", ".apm", ".oem", ".xml"}
 
 
 def read_columns(path: Path) -> Trajectory:
@@ -219,7 +219,7 @@ def read_columns(path: Path) -> Trajectory:
         if path.is_file():
             with path.open(errors="replace") as file:
                 head = file.read(4096)
-            if (found := re.search(r"CCSDS_(AEM|OEM)_VERS", head)) is not None:
+            if (found := re.search(r"CCSDS_(AEM|APM|OEM)_VERS", head)) is not None:
                 return Trajectory(source=str(path), **message_columns(path, found[1]))
             if suffix in TEXT:
                 return _of_text(path)

@@ -317,6 +317,8 @@ def _table_sections(config: Config, folder: Path) -> str:
     named: list[tuple[str, str, Callable[[TextIO], str]]] = []
     if isinstance(config.time.times, str):
         named.append(("[time] times", config.time.times, _times_of))
+    if config.initial.apm is not None:
+        named.append(("[initial] apm", config.initial.apm, _whole))
     for number, one in enumerate(config.loads, 1):
         orbit = getattr(one, "elements", None)
         if orbit is not None and orbit.table is not None:

@@ -85,6 +85,13 @@ class Epoch:
             day, rest = day - 1, rest + _DAY
         return _dated("UTC", day, rest)
 
+    def in_scale(self, scale: str) -> "Epoch":
+        """The same instant in another scale: exactly, or to some 1e-5 s from TDB or into it."""
+        found = Epoch(scale, self.day, self.ticks % _DAY)
+        for _ in range(3):  # seconds of TDB and others differ by 1e-8 at most
+            found = found.after(_decimal(self.since(found)))
+        return found
+
     def uniform(self) -> "Epoch":
         """The same instant in TDB or TT, whose days all have 86,400 s: in TDB if that is its scale."""
         return self if self.scale in ("TDB", "TT") else Epoch("TT", *divmod(round(self._count()), _DAY))
@@ -120,6 +127,10 @@ class Epoch:
         if self.scale == "UTC":
             return _count_of_utc(self.day, self.ticks)
         return self.day * _DAY + self.ticks + _TT_MINUS.get(self.scale, 0)
+
+
+def _decimal(value: Fraction) -> Decimal:
+    return _WIDE.divide(Decimal(value.numerator), Decimal(value.denominator))
 
 
 def _dated(scale: str, day: int, ticks: int) -> Epoch:

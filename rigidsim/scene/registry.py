@@ -268,6 +268,10 @@ their own such as ``[[rotors]]``, keys of ``[body]``, and keys of loads that bri
 
 OBSERVABLES: dict[str, Any] = {}
 """What can be recorded, by name, in the order in which a dataset holds it."""
+MESSAGES: dict[str, Callable[[str, str], Any]] = {}
+"""Readers of messages that give a start, by their keys of ``[initial]``: from a file's name and its text to a
+``Trajectory`` of one row.
+"""
 
 
 def one_of(table: str) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
+from decimal import Decimal
 from fractions import Fraction
 from functools import lru_cache, partial
 from itertools import islice
@@ -28,7 +29,7 @@ from pydantic import (
     model_validator,
 )
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.scene import units
 from rigidsim.scene.bodies.body import Body, Matter
 from rigidsim.scene.bodies.presets import PRESETS
@@ -74,7 +75,7 @@ from rigidsim.scene.kepler import Ellipse
 from rigidsim.scene.kernels.ephemeris import EphemerisTable
 from rigidsim.scene.paths import ARRAYS_OF_TABLES, Path
 from rigidsim.scene.point_masses import PointMassBody
-from rigidsim.scene.registry import LOADS, OBSERVABLES, LoadFields
+from rigidsim.scene.registry import LOADS, MESSAGES, OBSERVABLES, LoadFields
 from rigidsim.scene.sample_times import Time
 from rigidsim.scene.units import UnitError
 from rigidsim.scene.validation_messages import meant, shown
@@ -136,6 +137,10 @@ class Initial(Motion):
     equilibrium: Annotated[str, OneOf(EQUILIBRIUM_NAMES)] | None = None
     """start in an equilibrium, which is found: relative (at rest in the frame of a circular orbit; the stable
     one, or the one nearest to an attitude that is given), or a Cassini state of an orbit whose node moves
+    """
+    apm: StrictStr | None = Field(None, examples=["satellite.apm"])
+    """name of a file next to the config, a CCSDS attitude parameter message: its attitude, and its rates if
+    it has any; without [time] epoch its date is the start
     """
     relative_to: Annotated[str, OneOf(LOCAL_FRAMES)] | None = None
     """local frame of the orbit from which attitude and rates count, and whose rate is added: lvlh or vvlh (x
@@ -743,6 +748,16 @@ class Config(ConfigTable):
         start, changes = self.initial, dict[str, Any]()
         if start.tle is not None and self.time.epoch is None:
             changes["time"] = self.time.model_copy(update={"epoch": start.tle.epoch})
+        if start.apm in self.texts:
+            try:
+                stated = MESSAGES["apm"](start.apm, self.texts[start.apm])
+                if self.time.epoch is None:
+                    begun = stated.epochs[0].after(-Decimal(repr(float(self.time.start))))
+                    changes["time"] = self.time.model_copy(update={"epoch": begun})
+            except (RigidsimError, ValueError) as error:
+                raise refuse(f"[initial] apm: {error}") from None
+            if self.frame.axes is None and self.ephemeris is None:
+                changes["frame"] = self.frame.model_copy(update={"axes": stated.axes})
         if (start.tle or start.frame) and self.frame.axes is None and self.ephemeris is None:
             changes["frame"] = self.frame.model_copy(update={"axes": "GCRF"})
         return self.model_copy(update=changes) if changes else self

@@ -61,14 +61,14 @@ class InitialRotation:
     found: Any = None
 
 
-ATTITUDES = ("quaternion", "euler_angles", "pole", "obliquity")
+ATTITUDES = ("quaternion", "euler_angles", "pole", "obliquity", "apm")
 RATES = ("angular_velocity", "angular_momentum", "spin_period")
 """Keys of ``[initial]``, of which one gives the attitude and one the rates."""
 _BESIDE = {"node_longitude": ("obliquity",), "prime_meridian": ("pole", "obliquity")}
 """Keys that give nothing alone, and what each counts with."""
-_BESIDE_FOUND = {"relative": ATTITUDES}
+_BESIDE_FOUND = {"relative": ATTITUDES[:-1]}
 """What may be given with an equilibrium; a Cassini state takes a period."""
-_IN_SPACE = ("pole", "obliquity", "angular_momentum", "equilibrium")
+_IN_SPACE = ("pole", "obliquity", "apm", "angular_momentum", "equilibrium")
 """Keys that count in space, whatever turns."""
 STARTS: dict[str, Callable[[Any], InitialRotation]] = {}
 """Starts that rooms above find, by names of equilibria and keys: from the scene so far; ConfigError."""
@@ -96,7 +96,7 @@ def check_ways(table: Initial) -> None:
             text = f'given with equilibrium = "{found}", which finds it; remove one of them'
             ensure(key in _BESIDE_FOUND.get(str(found), ("spin_period",)), refusal(key, text))
     text = f"missing; exactly one of {', '.join(RATES)} and equilibrium is needed"
-    ensure(found is not None or ways[1], refusal("angular_velocity", text))
+    ensure(found is not None or ways[1] or table.apm is not None, refusal("angular_velocity", text))
     for key, takers in _BESIDE.items():
         text = f"given without {' or '.join(takers)}, with which it counts; add that"
         ensure(getattr(table, key) is None or _given(table, takers), refusal(key, text))
@@ -126,6 +126,8 @@ def given_attitude(scene: Setting) -> InitialRotation:
         return _from_pole(scene)
     if table.obliquity is not None:
         return STARTS["obliquity"](scene)
+    if table.apm is not None:
+        return STARTS["apm"](scene)
     sequence = scene.config.integrator.euler_sequence
     given = attitude.given_attitude(scene.context, table, sequence, refusal)
     if given is None:
@@ -139,7 +141,8 @@ def rotation_of(scene: Any) -> InitialRotation:
     if table.equilibrium is not None:
         key, start = "equilibrium", STARTS[table.equilibrium](scene)
     else:
-        (key,), rates = _given(table, RATES), vector(scene.context, table.angular_velocity)
+        key = next(iter(_given(table, RATES)), "apm")
+        rates = vector(scene.context, table.angular_velocity) if key != "apm" else scene.angular_velocity
         if key == "angular_momentum":
             rates = from_momentum(scene)
         elif key == "spin_period":

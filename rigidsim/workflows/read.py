@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import rigidsim.formats.message_starts
 import rigidsim.model.loads
 import rigidsim.model.observables.mechanical
 import rigidsim.solve.equilibria

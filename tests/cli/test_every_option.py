@@ -62,6 +62,7 @@ QUICK = {
     "plot runs/swept --out swept.png": 0,
     "analyse runs/free --variable angular_velocity.z --lines 1 --out lines.h5 --force --json": 0,
     "export runs/free --format aem --out free.aem --force --epoch J2000 --axes ICRF --object-name COIN": 0,
+    "export runs/free --format apm --out free.apm --epoch J2000 --axes ICRF --message time=TT,at=0": 0,
     "export runs/free --format oem --out free.oem --epoch J2000 --frame ICRF --object-id 2000-001A": 0,
     "export runs/free --format csv --out free.csv --angle-unit deg --variable quaternion": 0,
     "orbits pluto --end -1kyr --every 1kyr --window 0 --kernel de421 --out here --force --json": 2,

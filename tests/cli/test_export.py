@@ -168,6 +168,6 @@ def test_what_a_format_can_not_hold_is_said(config: Config, rigidsim_command: Co
         assert not Path(f"rates.{file_format}").exists()
     result = rigidsim_command("export", "runs/rates", "--format", "xml")
     assert result.exit_code == 2
-    assert "csv, parquet, zarr, aem, oem" in result.output
+    assert "csv, parquet, zarr, aem, apm, oem" in result.output
     result = rigidsim_command("export", "runs/rates", "--format", "aem", "--epoch", "yesterday")
     assert result.exit_code == 2

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from support import seeds
 
 import rigidsim
+from rigidsim.formats.registry import Naming
 from rigidsim.formats.trajectories import read_trajectory
 from rigidsim.scene.epochs import parse_epoch
 from rigidsim.workflows.compare.as_run import open_any
@@ -465,6 +466,209 @@ DATA_START
 2024-061T00:00:03 0 0 0 1
 DATA_STOP
 """
+
+
+BLOCKS = {
+    "QUATERNION": ("QUAT", "quaternionState"),
+    "EULER_ANGLE": ("EULER", "eulerAngleState"),
+    "SPIN": ("SPIN", "spin"),
+}
+OLD_ELEMENTS = {"eulerAngleState": "eulerElementsThree", "spin": "eulerElementsSpin"}
+
+
+def apm(given: Aem) -> str:
+    """A message of the first row: rates in a block of their own as the standard has them."""
+    row, keys = {name: values[0] for name, values in given.numbers(given.times).items()}, given.keys()
+    old, (attitude, _, rate) = given.version == 1, given.kind.partition("/")
+    mark, element = BLOCKS[attitude]
+    rng, numbers = given.rng, {name: repr(float(value)) for name, value in row.items()}
+    frames = {key: keys[key] for key in ("REF_FRAME_A", "REF_FRAME_B")}
+    turned = keys.get("EULER_ROT_SEQ", "")
+    own = frames | ({"EULER_ROT_SEQ": turned} if turned else {})
+    apart = [name for name in row if name.startswith("ANGVEL") or name.endswith("RATE")]
+    inside = {name: text for name, text in numbers.items() if name not in apart}
+    beside = {name: numbers[name] for name in apart}
+    names = {key: value for key, value in keys.items() if key in ("OBJECT_NAME", "OBJECT_ID", "TIME_SYSTEM")}
+    date = given.date(given.dates[0])
+    blocks = [(mark, element, own, inside)]
+    if rate == "ANGVEL":
+        along = {"ANGVEL_FRAME": keys["ANGVEL_FRAME"]}
+        if rng.integers(2):  # between the same frames, the other way
+            other = dict(zip(frames, reversed(frames.values()), strict=True))
+            letter = "AB".find(keys["ANGVEL_FRAME"][-1]) if keys["ANGVEL_FRAME"] in frames else -1
+            along = along if letter < 0 else {"ANGVEL_FRAME": f"REF_FRAME_{'BA'[letter]}"}
+            negative = {name: repr(-float(text)) for name, text in beside.items()}
+            blocks.append(("ANGVEL", "angularVelocity", other | along, negative))
+        else:
+            blocks.append(("ANGVEL", "angularVelocity", frames | along, beside))
+    if old:
+        frame = keys.get("RATE_FRAME", "").replace("REF_FRAME", "EULER_FRAME")
+        blocks = [(mark, element, own | {"REF_DIR": given.direction}, inside)]
+        if rate == "RATE" and attitude == "EULER_ANGLE":
+            blocks[0][2]["RATE_FRAME"] = frame
+            inside |= beside
+        elif rate == "RATE":
+            about = frames | {"EULER_ROT_SEQ": "312", "REF_DIR": given.direction, "RATE_FRAME": frame}
+            blocks.append(("EULER", "eulerElementsThree", about, beside))
+
+    def renamed(key: str, mark: str) -> str:
+        prefix = {"QUAT": "Q"}.get(mark, mark)
+        return key.replace("REF_", f"{prefix}_") if old and mark != "ANGVEL" else key
+
+    lines, elements = [], []
+    for mark, element, about, texts in blocks:
+        items = [(renamed(key, mark), value) for key, value in about.items()]
+        if old and "ANGLE_1" in texts:  # named by their axes
+            axes = ["XYZ"["123".index(n)] for n in turned]
+            plain = [(f"{axis}_ANGLE", texts[f"ANGLE_{n}"]) for n, axis in enumerate(axes, 1)]
+            plain += [(name, text) for name, text in texts.items() if not name.startswith("ANGLE_")]
+        else:
+            plain = list(texts.items())
+        units = "" if rng.integers(2) or mark == "QUAT" else " [deg/s]"
+        body = [f"{key} = {value}" for key, value in items]
+        body += [f"{key} = {value}{units if 'ANGVEL' in key else ''}" for key, value in plain]
+        lines += body if old else [f"{mark}_START", "COMMENT a block", *body, f"{mark}_STOP"]
+        leaves = [f"<{key}>{value}</{key}>" for key, value in items]
+        for key, value in plain:
+            n = next(
+                (n for n, x in enumerate(turned, 1) if old and key == f"{'XYZ'['123'.index(x)]}_ANGLE"), 0
+            )
+            leaves.append(
+                f'<rotation{n} angle="{key}" units="deg">{value}</rotation{n}>'
+                if n
+                else f"<{key}>{value}</{key}>"
+            )
+        tag = OLD_ELEMENTS.get(element, element) if old else element
+        elements.append(f"<{tag}>{''.join(leaves)}</{tag}>")
+    if given.xml:
+        about = "".join(f"<{key}>{value}</{key}>" for key, value in names.items())
+        return (
+            f'<apm id="CCSDS_APM_VERS" version="{given.version}.0"><body><segment>'
+            f"<metadata>{about}</metadata><data><EPOCH>{date}</EPOCH>{''.join(elements)}<inertia><IXX>1</IXX></inertia></data></segment>"
+            "</body></apm>"
+        )
+    head = [f"CCSDS_APM_VERS = {given.version}.0", *(f"{key} = {value}" for key, value in names.items())]
+    tail = [] if old else ["MAN_START", "MAN_TOR_X = 1 [N*m]", "MAN_STOP", "MAN_START", "MAN_STOP"]
+    return "\n".join([*head, f"EPOCH = {date}", *lines, *tail, ""])
+
+
+@pytest.mark.parametrize("seed", seeds(2, 60))
+def test_parameter_messages_are_starts_and_data(seed: int, tmp_path: Path) -> None:
+    """Four APM a seed of both versions, in KVN and XML, with all types, directions, frames and clocks."""
+    rng = np.random.default_rng(seed)
+    for _ in range(4):
+        given = Aem(rng)
+        while given.version == 1 and len(set(given.sequence)) < 3:
+            given = Aem(rng)
+        path = tmp_path / "top.apm"
+        path.write_text(apm(given))
+        first = given.times[:1]
+        columns = read_trajectory(path).columns
+        read = Rotation.from_quat(np.stack([columns[name] for name in ("qx", "qy", "qz", "qw")], axis=1))
+        assert (read.inv() * given.top.attitude(first)).magnitude()[0] < 1e-7, path.read_text()
+        rates = "" if "wx" in columns else "angular_velocity = [0, 0, 1]"
+        text = f'name = "top"\n[body]\nprincipal_moments = [1, 1, 1]\n[initial]\napm = "top.apm"\n{rates}\n'
+        (tmp_path / "top.toml").write_text(f"{text}[time]\nend = 1\nsamples = 2\n[output]\ntimeline = false")
+    begun = rigidsim.load(tmp_path / "top.toml")
+    shown = rigidsim.run(begun, out=None).dataset
+    read = Rotation.from_quat(np.roll(shown.quaternion.values[0], -1))
+    assert (read.inv() * given.top.attitude(first)[0]).magnitude() < 1e-7
+    if not rates:
+        close = 1e-8 if "DERIVATIVE" in given.kind or "SPIN" in given.kind else 1e-12
+        assert np.abs(shown.angular_velocity.values[0] - given.top.rates(first)[0]).max() < close
+    assert shown.attrs["epoch"] == str(parse_epoch(f"{given.dates[0].isoformat()} {given.scale}"))
+
+
+STATE = """CCSDS_APM_VERS = 1.0
+TIME_SYSTEM = TAI
+EPOCH = 2024-061T00:00:00
+EULER_FRAME_A = EME2000
+EULER_FRAME_B = SC_BODY_1
+EULER_DIR = A2B
+EULER_ROT_SEQ = 312
+Z_ANGLE = 10 [deg]
+X_ANGLE = 20
+Y_ANGLE = 30
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("10 [deg]", "10 [rad]", r"line 8: Z_ANGLE in \[rad\]; allowed: deg"),
+        ("= 312", "= 313", "EULER_ROT_SEQ = ZXZ, of whose angles two would have one name"),
+        ("Y_ANGLE", "X_ANGLE", "X_ANGLE is there twice; leave one of them"),
+        ("Z_ANGLE = 10 [deg]\nX_ANGLE = 20\nY_ANGLE = 30\n", "", "it has no attitude; a quaternion"),
+        ("Y_ANGLE = 30\n", "", "has no ANGLE_3, which is needed"),
+        ("EULER_DIR = A2B\n", "", "ATTITUDE_DIR is missing; allowed: A2B, B2A"),
+        ("EME2000", "ITRF-97", "its attitude is against ITRF-97; allowed: EME2000, GCRF, ICRF"),
+        ("Y_ANGLE = 30", "Y_ANGLE 30", 'line 10: "Y_ANGLE 30"; a keyword with = is allowed'),
+        ("Y_ANGLE = 30", "Y_ANGLE = 30", "has no rates; give angular_velocity"),
+    ],
+)
+def test_a_message_that_is_no_start_is_refused(old: str, new: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "top.apm").write_text(STATE.replace(old, new))
+    (tmp_path / "top.toml").write_text(
+        'name = "top"\n[body]\nprincipal_moments = [1, 1, 1]\n[initial]\napm = "top.apm"\n[time]\nend = 1'
+    )
+    with pytest.raises(rigidsim.ConfigError, match=message):
+        rigidsim.run(rigidsim.load(tmp_path / "top.toml"), out=None)
+
+
+@pytest.mark.parametrize("seed", seeds(2, 60))
+def test_messages_of_all_types_are_written(seed: int, tmp_path: Path) -> None:
+    """An AEM and an APM, read word by word."""
+    rng = np.random.default_rng(seed)
+    top, axes = Top(rng), str(rng.choice(["EME2000", "ecliptic J2000"]))
+    x, y, z, w = top.attitude(np.zeros(1)).as_quat()[0].tolist()
+    scale, clock = rng.choice(["TAI", "UTC", "GPS", "TT"], 2)
+    scene = SCENE.format(
+        c=1.5, q=[w, x, y, z], w=top.rates(np.zeros(1))[0].tolist(), axes=axes,
+        epoch=f"2024-03-01T00:00:00.25 {scale}", end=6.0,
+    ).replace("samples = 2", "samples = 13")  # fmt: skip
+    run = rigidsim.run(rigidsim.parse(scene), out=tmp_path)
+    kind = str(rng.choice(["quaternion", "quaternion/derivative", "quaternion/angvel", "euler_angle/angvel"]))
+    sequence, source = str(rng.choice(SEQUENCES)).lower(), str(rng.choice(["space", "body"]))
+    options = {"type": kind, "sequence": sequence, "from": source, "time": str(clock)}
+    naming = {n: Naming(message=options | m) for n, m in {"aem": {"segment": "2 s"}, "apm": {}}.items()}
+    [aem] = rigidsim.export(run, "aem", tmp_path / "top.aem", naming=naming["aem"])
+    [one] = rigidsim.export(run, "apm", tmp_path / "top.apm", naming=naming["apm"])
+    dataset = run.dataset
+    turn = Rotation.from_euler("x", OBLIQUITY if axes.startswith("ecl") else 0.0)
+    body = turn * Rotation.from_quat(np.roll(dataset.quaternion.values, -1, axis=1))
+    lead, rates = (body, dataset.angular_velocity.values) if source == "space" else (
+        body.inv(), -dataset.angular_velocity.values
+    )  # fmt: skip
+    text = aem.read_text()
+    assert text.count("META_START") == 3
+    rows = {
+        line.split()[0]: [float(x) for x in line.split()[1:]]
+        for line in text.splitlines()
+        if line[:2] == "20"
+    }
+    assert len(rows) == 13
+    zero = parse_epoch(f"2024-03-01T00:00:00.25 {scale}")
+    for n, (date, row) in enumerate(rows.items()):
+        assert parse_epoch(date, str(clock)).since(zero) == n / 2
+        numbers = np.array(row)
+        if kind.startswith("euler"):
+            written = Rotation.from_euler(sequence.upper(), numbers[:3], degrees=True)
+        else:
+            written = Rotation.from_quat(numbers[:4])
+        assert (written.inv() * lead[n]).magnitude() < 1e-14
+        if kind.endswith("angvel"):  # along body axes
+            assert np.abs(np.radians(numbers[-3:]) - rates[n]).max() < 1e-15
+        if kind.endswith("derivative"):
+            x, y, z, w = numbers[:4]
+            target = rates[n] if source == "space" else body[n].apply(rates[n])
+            change = 0.5 * np.append(w * target + np.cross([x, y, z], target), -np.dot([x, y, z], target))
+            assert np.abs(numbers[4:] - change).max() < 1e-15
+    keys = dict(line.split(" = ") for line in one.read_text().splitlines() if " = " in line)
+    names = ["ANGLE_1", "ANGLE_2", "ANGLE_3"] if kind.startswith("euler") else ["Q1", "Q2", "Q3", "QC"]
+    assert [float(keys[name]) for name in names] == numbers[: len(names)].tolist()
+    assert keys["EPOCH"] == date
+    ends = [keys["REF_FRAME_A"], keys["REF_FRAME_B"]]
+    assert ends == ["EME2000", "SC_BODY_1"][:: 1 if source == "space" else -1]
 
 
 @pytest.mark.parametrize("name", WRONG)

@@ -39,11 +39,12 @@ def analyse(
 def export(
     run_path: Path, file_format: str, out: Path | None, force: bool, angle_unit: str | None,
     epoch: str | None, axes: str | None, object_name: str | None, object_id: str | None,
-    variable: list[str] | None,
+    message: str | None, variable: list[str] | None,
 ) -> None:  # fmt: skip
     """Write a run or a sweep for other tools."""
     given = {"epoch": epoch, "axes": axes, "object_name": object_name, "object_id": object_id}
-    naming = Naming(**{key: value for key, value in given.items() if value is not None})
+    asked = dict(part.partition("=")[::2] for part in (message or "").split(",") if part.strip())
+    naming = Naming(**{key: value for key, value in given.items() if value is not None}, message=asked)
     written = exporting.export(
         open_saved(run_path),
         file_format,

@@ -417,7 +417,7 @@ def _usable(sigma: Any) -> Any:
 
 # --- parameters ---------------------------------------------------------------------------------------------
 
-_FORMS = ("euler_angles", "pole", "prime_meridian", "obliquity", "node_longitude")
+_FORMS = ("euler_angles", "pole", "prime_meridian", "obliquity", "node_longitude", "apm")
 
 
 @dataclass(frozen=True)
@@ -522,9 +522,14 @@ class FitKeys:
         given = np.array([float(x) for x in given_attitude(self.scene).quaternion])
         quaternion = multiplied(given[None, :], of_vector(turn[None, :]))[0]
         texts = [f"initial.{name}=" for name in _FORMS if getattr(initial, name) is not None]
-        if initial.spin_period is not None:
-            rates = ", ".join(repr(float(spin_rate(self.scene) * x)) for x in self.scene.figure.pole)
+        if initial.spin_period is not None or initial.apm is not None:
+            along = self.scene.angular_velocity
+            if initial.spin_period is not None:
+                along = [spin_rate(self.scene) * x for x in self.scene.figure.pole]
+            rates = ", ".join(repr(float(w)) for w in along)
             texts += ["initial.spin_period=", f"initial.angular_velocity=[{rates}]"]
+        if initial.apm is not None:  # which implies them
+            texts += [f'time.epoch="{self.scene.epoch}"', f'frame.axes="{self.scene.axes}"']
         shown_values = ", ".join(repr(float(x)) for x in quaternion)
         return [*texts, f"initial.quaternion=[{shown_values}]"]
 
