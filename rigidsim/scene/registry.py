@@ -244,6 +244,10 @@ class SceneLoad:
         """The load where the point masses are elsewhere: itself, unless its source is one of them."""
         return self
 
+    def with_partner(self, partner: Sequence[Vector]) -> SceneLoad:
+        """The load with a second body's start that was found (see ``InitialRotation``)."""
+        return self
+
     def pictured(self) -> dict[str, Any] | None:
         """The load's depiction as plain JSON values (see ``rigidsim.look.record``); None if it isn't
         drawn.

@@ -145,8 +145,14 @@ class Scene(Setting):
     def started(self, start: starts.InitialRotation) -> Scene:
         """The same scene with another start."""
         rates = self.angular_velocity if start.angular_velocity is None else start.angular_velocity
+
+        def begun(loads: tuple[Any, ...]) -> tuple[Any, ...]:
+            return tuple(load.with_partner(start.partner) for load in loads) if start.partner else loads
+
         return replace(
             self,
+            loads=begun(self.loads),
+            tabled={name: begun(loads) for name, loads in self.tabled.items()},
             quaternion=start.quaternion,
             angular_velocity=rates,
             euler_angles=start.euler_angles,
@@ -175,7 +181,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             return None
 
     body = attempt(_body_at_start, config, context)
-    attempt(starts.check_ways, config.initial)
+    attempt(starts.check_ways, config)
     times = attempt(sample_times, config.time, context, config.texts)
     if body is None or times is None or problems:
         raise ConfigError(problems, source)

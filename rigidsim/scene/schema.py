@@ -625,12 +625,19 @@ class RigidBodyTable(Matter, Motion):
     velocity count from the centre of mass of ``[body]``.
     """
 
-    rules = (excludes("orbit", "position", "velocity"),)
+    rules = (
+        excludes("orbit", "position", "velocity"),
+        excludes("equilibrium", "orbit", "velocity", "angular_velocity"),
+    )
 
     name: VariableName = Field(examples=["dimorphos"])
     """letters, digits and underscores, beginning with a letter; its label in the dataset"""
     orbit: RelativeOrbit | None = Field(None, examples=[{"semi_major_axis": "1190 m", "eccentricity": 0.02}])
     """osculating elements about [body] at the start, instead of position and velocity"""
+    equilibrium: Annotated[str, OneOf(("synchronous", "doubly_synchronous"))] | None = None
+    """start on a circular orbit in the equator of [body], which always sees the same side of this one; at the
+    distance of position velocity, attitude and rates are found; doubly_synchronous: both bodies show one side
+    """
 
 
 _NUMBER = ("", "1")

@@ -53,20 +53,24 @@ class InitialRotation:
         angular_velocity: body axes, rad/s; None from a way that gives the attitude alone.
         euler_angles: as given, rad; None if given otherwise.
         found: how an equilibrium was found, for reports; None for a start that was given.
+        partner: position, velocity, quaternion and rates of the second body, if they are found; or None.
     """
 
     quaternion: Vector
     angular_velocity: Vector | None = None
     euler_angles: Vector | None = None
     found: Any = None
+    partner: Any = None
 
 
+DOUBLY = "doubly_synchronous"
+"""The equilibrium of a second body by which ``[body]`` starts, too."""
 ATTITUDES = ("quaternion", "euler_angles", "pole", "obliquity", "apm")
 RATES = ("angular_velocity", "angular_momentum", "spin_period")
 """Keys of ``[initial]``, of which one gives the attitude and one the rates."""
 _BESIDE = {"node_longitude": ("obliquity",), "prime_meridian": ("pole", "obliquity")}
 """Keys that give nothing alone, and what each counts with."""
-_BESIDE_FOUND = {"relative": ATTITUDES[:-1]}
+_BESIDE_FOUND = dict.fromkeys(("relative", DOUBLY), ATTITUDES[:-1])
 """What may be given with an equilibrium; a Cassini state takes a period."""
 _IN_SPACE = ("pole", "obliquity", "apm", "angular_momentum", "equilibrium")
 """Keys that count in space, whatever turns."""
@@ -85,9 +89,16 @@ def angle_out_of_range(key: str, what: str, context: Any, angle: Any, allowed: s
     return refusal(key, f'given {degrees}; {allowed} is allowed, and degrees have their unit: "23.44 deg"')
 
 
-def check_ways(table: Initial) -> None:
+def pair_equilibrium(config: Config) -> str | None:
+    """The equilibrium that a second body starts in; None without one."""
+    return next((body.equilibrium for body in config.rigid_bodies), None)
+
+
+def check_ways(config: Config) -> None:
     """Refuse what contradicts itself before anything is worked out."""
-    found, ways = table.equilibrium, [_given(table, ATTITUDES), _given(table, RATES)]
+    table, pair = config.initial, pair_equilibrium(config)
+    found = pair if pair == DOUBLY and table.equilibrium is None else table.equilibrium
+    ways = [_given(table, ATTITUDES), _given(table, RATES)]
     for way, what in zip(ways, ("attitude", "start of the rates"), strict=True):
         for other in way[1:]:
             text = f"given with {way[0]}; only one {what} is allowed: remove one of them"
@@ -137,9 +148,11 @@ def given_attitude(scene: Setting) -> InitialRotation:
 
 def rotation_of(scene: Any) -> InitialRotation:
     """Attitude and rates at the start of a scene that has an attitude."""
-    table = scene.config.initial
+    table, pair = scene.config.initial, pair_equilibrium(scene.config)
     if table.equilibrium is not None:
         key, start = "equilibrium", STARTS[table.equilibrium](scene)
+    elif pair == DOUBLY:
+        key, start = "equilibrium", InitialRotation(scene.quaternion, scene.angular_velocity)
     else:
         key = next(iter(_given(table, RATES)), "apm")
         rates = vector(scene.context, table.angular_velocity) if key != "apm" else scene.angular_velocity
@@ -150,6 +163,8 @@ def rotation_of(scene: Any) -> InitialRotation:
         start = InitialRotation(scene.quaternion, rates, scene.euler_angles)
         if table.relative_to is not None:
             start = STARTS["relative rates"](scene.started(start))
+    if pair is not None:
+        start = STARTS[pair](scene.started(start))
     what = "has a spin about the axis that has no moment of inertia, where a spin means nothing; make that "
     ensure(not _along_massless(scene.body, start.angular_velocity), refusal(key, what + "component zero"))
     return start

@@ -47,6 +47,7 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
+from rigidsim.errors import ConfigError
 from rigidsim.model.load import Load, loads_of
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import (
@@ -286,11 +287,16 @@ def exponents_of(
         values.remove(min(values, key=lambda value: abs(value - turned)))
     if period is not None:
         values = [context.log(value) / period for value in values]
+    return listed(values, still)
+
+
+def listed(values: Iterable[Any], still: Any) -> tuple[tuple[tuple[float, float], ...], bool]:
+    """Exponents as ``exponents_of`` gives them."""
     found = []
     for value in values:
-        real, imaginary = (context.zero if abs(x) <= still else x for x in (value.real, value.imag))
+        real, imaginary = (0.0 if abs(x) <= still else float(x) for x in (value.real, value.imag))
         if imaginary >= 0:
-            found.append((float(real), float(imaginary)))
+            found.append((real, imaginary))
     found.sort(key=lambda pair: (pair[1], pair[0]))
     return tuple(found), all(real <= 0 for real, _ in found)
 
@@ -861,7 +867,17 @@ _BESIDE = ("name", "description", "integrator", "model", "output", "limits", "sw
 _known: OrderedDict[Any, InitialRotation] = OrderedDict()
 
 
-def _once(name: str, find: Callable[[Scene], InitialRotation], scene: Scene) -> InitialRotation:
+def once(
+    name: str,
+    find: Callable[[Scene], InitialRotation],
+    scene: Scene,
+    fault: Callable[[str, str], ConfigError] = refusal,
+) -> InitialRotation:
+    """The start that is found, perhaps before in this process.
+
+    Raises:
+        ConfigError: made by ``fault`` of a key and a text, if there is none.
+    """
     if isinstance(scene.context, SweptContext):
         raise Untraceable("an equilibrium that is found")
     tables = {name: table for name, table in scene.config if name not in _BESIDE}
@@ -871,18 +887,17 @@ def _once(name: str, find: Callable[[Scene], InitialRotation], scene: Scene) -> 
             _known[key] = find(scene)
         except NoEquilibrium as none:
             remedy = "" if ";" in str(none) else "; give the attitude and rates themselves"
-            raise refusal("equilibrium", f'given "{name}", but {none}{remedy}') from None
+            raise fault("equilibrium", f'given "{name}", but {none}{remedy}') from None
         while len(_known) > _KEPT:
             _known.popitem(last=False)
     found, own = _known[key], scene.context.make_mpf
-    quaternion, rates = (
-        [own(x._mpf_) for x in vector] for vector in (found.quaternion, found.angular_velocity or ())
-    )
-    return InitialRotation(quaternion, rates, found=found.found)
+    vectors = (found.quaternion, found.angular_velocity or (), *(found.partner or ()))
+    quaternion, rates, *partner = ([own(x._mpf_) for x in vector] for vector in vectors)
+    return InitialRotation(quaternion, rates, found=found.found, partner=partner or None)
 
 
 _FINDERS: dict[str, Callable[[Scene], InitialRotation]] = {
     "relative": relative_equilibrium,
     **{f"cassini_{number}": partial(cassini_state, number=number) for number in (1, 2, 3, 4)},
 }
-STARTS.update({name: partial(_once, name, find) for name, find in _FINDERS.items()})
+STARTS.update({name: partial(once, name, find) for name, find in _FINDERS.items()})

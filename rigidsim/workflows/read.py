@@ -12,7 +12,8 @@ import rigidsim.formats.message_starts
 import rigidsim.model.loads
 import rigidsim.model.observables.mechanical
 import rigidsim.solve.equilibria
-import rigidsim.solve.local_frames  # noqa: F401  (each enters what it defines into a registry of rigidsim.scene)
+import rigidsim.solve.local_frames
+import rigidsim.solve.pair_equilibria  # noqa: F401  (each enters what it defines into a registry below)
 from rigidsim.errors import ConfigError, Problem, RunFolderError, run_again
 from rigidsim.scene.config import Experiment, Overrides, parse
 from rigidsim.scene.config import load as load_file

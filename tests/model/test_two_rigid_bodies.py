@@ -10,7 +10,8 @@ import mpmath
 import numpy as np
 import pytest
 from equations import Random, derivative, matrix, observed
-from support import config, loaded, run_text, same_bits, seeds, wide
+from scipy.interpolate import make_interp_spline
+from support import config, loaded, matrices, run_text, same_bits, seeds, wide
 
 import rigidsim
 from rigidsim.solve.problem import prepare
@@ -347,3 +348,86 @@ def test_formulations_that_know_one_body_alone_are_refused(formulation: str) -> 
         return
     one, other = loaded(run_text(text)), loaded(run_text(pair(2, time="end = 5\nsamples = 2")))
     np.testing.assert_allclose(one["rigid_body_position"], other["rigid_body_position"], rtol=0, atol=1e-13)
+
+
+# --- equilibria ---------------------------------------------------------------------------------------------
+
+DIDYMOS = """
+shape = "ellipsoid"
+mass = 5.24e11
+semi_axes = [425, 425, 310]"""
+DIMORPHOS = """[[rigid_bodies]]
+name = "dimorphos"
+shape = "ellipsoid"
+mass = 4.8e9
+semi_axes = [103.16, 79.35, 66.13]
+position = [1190, 0, 0]
+"""
+SPIN = "angular_velocity = [0, 0, 7.7227e-4]"
+FOUND = DIMORPHOS + 'equilibrium = "synchronous"'
+
+
+def didymos(more: str = FOUND, initial: str = SPIN, load: str = "degree = 4", **keys: str) -> str:
+    return config(DIDYMOS, initial, f'kind = "mutual_gravity"\n{load}', more=more, **keys)
+
+
+def test_the_synchronous_equilibrium_of_didymos_is_found_to_all_digits() -> None:
+    """Rate, and the periods of free libration and of epicycles, against an independent program."""
+    run = run_text(didymos(time="end = 10\nsamples = 2", integrator='precision = "quadruple"'))
+    rate = wide(loaded(run), "rigid_body_angular_velocity")[0, 0, 2]
+    assert abs(rate / np.longdouble("1.46222954520648423e-4") - 1) < 5e-18
+    found = run.summary["start"]["equilibrium"]
+    periods = [2 * math.pi / x / 3600 for _, x in found["exponents"] if x]
+    assert found["stable"]
+    for known in (13.8707715, 11.98384857636635):
+        assert min(abs(p - known) for p in periods) < 1e-7 * known
+    data = loaded(run_text(didymos(time="end = 4.3e5\nevery = 4e3")))
+    assert np.abs(data["separation"] / 1190 - 1).max() < 1e-12
+    assert np.abs(data["yaw"]).max() < 1e-11
+
+
+def test_after_the_impact_the_mean_period_is_that_of_an_independent_program() -> None:
+    """500 revolutions after a change of the relative velocity by -2.6 mm/s: 11.389939721 h."""
+    start = "velocity = [0, 0.17140531587957162392, 0]\nangular_velocity = [0, 0, 1.46222954520648423e-4]"
+    time, record = "end = 2.06e7\nevery = 1500", 'record = ["orbit_angle", "yaw"]'
+    data = loaded(run_text(didymos(DIMORPHOS + start, time=time, output=record)))
+    passed = make_interp_spline(data["orbit_angle"].values, data["time"].values, k=7)
+    assert float(passed(1000 * np.pi)) / 500 / 3600 == pytest.approx(11.389939721, rel=1e-10)
+    assert np.degrees(np.abs(data["yaw"]).max()) == pytest.approx(26.16, abs=0.02)
+
+
+@pytest.mark.parametrize("seed", seeds(1, 10))
+def test_two_odd_bodies_that_face_each_other_go_on_doing_so(seed: int) -> None:
+    """Any moments to degree 4: distance, and what each sees of the other, stay through a revolution."""
+    random = Random(seed)
+    one, other = Points.drawn(random), Points.drawn(random)
+    axes = np.linalg.eigh(one.inertia)[1]
+    place = 4 * axes[:, 0] / np.linalg.norm(axes[:, 0])
+    second = f'[[rigid_bodies]]\nname = "b"\n{other.keys}\nposition = {place.tolist()}\n'
+    text = config(
+        one.keys, "", 'kind = "mutual_gravity"\ndegree = 4', "end = 25\nsamples = 11",
+        more=f'{second}equilibrium = "doubly_synchronous"',
+    )  # fmt: skip
+    run = run_text(text)
+    data = loaded(run)
+    seen = []
+    for q in (data["quaternion"].values, data["rigid_body_quaternion"].values[:, 0]):
+        seen.append(np.einsum("tji,tj->ti", matrices(q), data["rigid_body_position"].values[:, 0]))
+    grown = max(x for x, _ in run.summary["start"]["equilibrium"]["exponents"]) * 25
+    for vectors in seen:
+        assert np.abs(vectors - vectors[0]).max() < 1e-13 * math.exp(grown) * 40
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (didymos(FOUND + "\nvelocity = [0, 1, 0]"), "equilibrium"),
+        (didymos(FOUND.replace("[1190, 0, 0]", "[1190, 0, 9]")), "0.4333 deg out of the equator of [body]"),
+        (didymos(initial="angular_velocity = [1e-6, 0, 7e-4]"), "[body] doesn't turn about its figure axis"),
+        (didymos(FOUND.replace("sync", "doubly_sync")), "angular_velocity: given with equilibrium"),
+        (config(DIDYMOS, SPIN, more=FOUND), 'there is no load of kind = "mutual_gravity"'),
+    ],
+)
+def test_refused_equilibria(text: str, words: str) -> None:
+    with pytest.raises(rigidsim.ConfigError, match=re.escape(words)):
+        prepare(rigidsim.parse(text))

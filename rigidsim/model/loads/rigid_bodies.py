@@ -38,7 +38,7 @@ force follows from the torques and from the terms U_l of total degree l, which f
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -347,6 +347,7 @@ class SecondBody(Load):
     first: RigidBody
     pair: Pair | None
     start: Start
+    where: str
 
     conservative = True
     loose = True  # see ``Load``
@@ -366,6 +367,13 @@ class SecondBody(Load):
         """m_A m_B / (m_A + m_B), kg."""
         one, other = required(self.first.mass), required(self.body.mass)
         return one * other / (one + other)
+
+    def fault(self, key: str, text: str) -> ConfigError:
+        """The error that names a key of its table."""
+        return ConfigError(Problem(f"{self.where} {key}", text))
+
+    def with_partner(self, partner: Sequence[Vector]) -> SecondBody:
+        return replace(self, start=Start(*partner))
 
     # --- sizes ----------------------------------------------------------------------------------------------
 
@@ -522,7 +530,7 @@ class SecondBody(Load):
                     )
                 figures.append(figure)
             pair = Pair((figures[0], figures[1]), degree, context)
-        return cls(fields.name, body, around.body, pair, _started(fields, around, pair))
+        return cls(fields.name, body, around.body, pair, _started(fields, around, pair), around.where(""))
 
 
 _NO_MASS = "missing; two bodies need theirs, since each moves as the other one is heavy"
@@ -572,8 +580,9 @@ def _built(fields: RigidBodyTable, around: Setting) -> RigidBody:
 
 def _started(fields: RigidBodyTable, around: Setting, pair: Pair | None) -> Start:
     context = around.context
-    what = "missing; give the body's rates"
-    ensure(fields.angular_velocity is not None, around.fault("angular_velocity", what))
+    what = "missing; give the body's rates, or an equilibrium"
+    known = fields.angular_velocity is not None or fields.equilibrium is not None
+    ensure(known, around.fault("angular_velocity", what))
     sequence = around.config.integrator.euler_sequence
     given = attitude.given_attitude(context, fields, sequence, around.fault)
     quaternion = [context.one] + [context.zero] * 3 if given is None else given[0]
