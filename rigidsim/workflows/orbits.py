@@ -131,9 +131,7 @@ def write_orbits(
             raise RigidsimError(
                 f"PLANET: given {shown(name)}{nearest(name, PLANETS)}; allowed: {', '.join(PLANETS)}"
             )
-    rhythm = _rhythm(
-        *(_seconds(f"--{k}", v) for k, v in (("end", end), ("every", every), ("window", window)))
-    )
+    rhythm = _rhythm(_seconds("--end", end), _seconds("--every", every), _seconds("--window", window))
     missing = [name for name in ("rebound", "numba") if find_spec(name) is None]
     if missing:
         raise RigidsimError(
@@ -230,7 +228,8 @@ def _averages(start: np.ndarray, rhythm: _Rhythm, bodies: list[int]) -> Iterator
     seen: list[np.ndarray] = []
     last = (rhythm.rows + BEYOND) * rhythm.looks + rhythm.half
     for look in range(rhythm.first, last + 1):
-        seen = [*seen[max(0, len(seen) - 2 * rhythm.half) :], planets.elements(bodies)]
+        if (look + rhythm.half) % rhythm.looks <= 2 * rhythm.half:  # within a window
+            seen = [*seen[max(0, len(seen) - 2 * rhythm.half) :], planets.elements(bodies)]
         row, rest = divmod(look - rhythm.half, rhythm.looks)
         if not rest and len(seen) == len(weights):
             yield row, np.tensordot(weights, np.array(seen), 1)
