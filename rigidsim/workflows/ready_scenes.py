@@ -43,6 +43,7 @@ SUBJECTS: Mapping[str, tuple[str, ...]] = {
         "mars_with_table",
         "mars_obliquity", "earth_deep_time", "phobos_libration", "vesta_nutation",
     ),
+    "Two rigid bodies": ("didymos", "didymos_after_dart", "kw4_1999", "antiope"),
     "Under JPL's ephemerides (pip install 'rigidsim[ephemeris]')": (
         "moon_since_1969", "rigid_moon", "rigid_earth_nutation", "mars_nutation", "mercury_libration",
         "apophis_2029",
@@ -59,6 +60,7 @@ ALIASES: Mapping[str, str] = {
     "boom": "gravity_gradient_boom",
     "cassini": "moon_cassini_state",
     "chandler": "earth_free_nutation",
+    "dart": "didymos_after_dart",
     "dzhanibekov": "intermediate_axis",
     "euler": "asymmetric_top",
     "feynman": "tossed_plate",

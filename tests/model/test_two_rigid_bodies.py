@@ -431,3 +431,13 @@ def test_two_odd_bodies_that_face_each_other_go_on_doing_so(seed: int) -> None:
 def test_refused_equilibria(text: str, words: str) -> None:
     with pytest.raises(rigidsim.ConfigError, match=re.escape(words)):
         prepare(rigidsim.parse(text))
+
+
+@pytest.mark.parametrize("name", ["didymos", "didymos_after_dart", "kw4_1999", "antiope"])
+def test_ready_scenes_keep_what_is_conserved(name: str) -> None:
+    run = rigidsim.run(rigidsim.load(name, overrides=["time.end='2 day'", "output.timeline=false"]), out=None)
+    assert run.summary["warnings"] == []
+    for one, row in run.summary["invariants"].items():
+        assert row["largest_drift"] <= row["bound"], one
+    kept = {"energy", "angular_momentum"}
+    assert kept <= {one for one, row in run.summary["invariants"].items() if not row["numerical"]}
