@@ -48,6 +48,8 @@ SATELLITE = config(
         'kind = "radiation_pressure"\nlight = "sun"',
         'kind = "magnetic_dipole"\nmoment = ["-0.1*(bx - 0.2)", "0.01", "0.02"]\nfield = [0.3, 0, -0.4]',
         'kind = "eddy_currents"\nconductivity = 100\nradius = 0.5\nfield = [0.1, 0, 0.2]',
+        'kind = "hysteresis_rod"\nname = "rod"\naxis = [0, 1, 1]\nvolume = 1e-6\ncoercivity = 1e5\n'
+        "remanence = 0.05\nsaturation = 0.1",
     ],
     more='[frame]\naxes = "EME2000"\n',
 )

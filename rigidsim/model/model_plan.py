@@ -162,7 +162,7 @@ def _choose_requirements(scene: Scene, loads: Sequence[Load]) -> Requirements:
     else:
         left_out.append(("position and velocity", "neither recorded nor read by a load"))
     carried = [state.name for state in scene.states]
-    unread = [table.name for table in scene.config.states if table.name not in carried]
+    unread = [table.name for _, _, table in scene.config.every_state if table.name not in carried]
     if unread:
         left_out.append((", ".join(unread), "neither recorded nor read by anything that is carried"))
     return Requirements("attitude" in why, "vertical" in why, "flight" in why, record, why, left_out)

@@ -46,7 +46,7 @@ class OwnStateNames(NameProvider):
 
     def names(self, config: Config) -> Iterable[Readable]:
         """All of the config, whether they are carried or not."""
-        for x in config.states:
+        for _, _, x in config.every_state:
             yield Readable(x.name, "" if x.unit == "1" else x.unit, frozenset({x.name}))
 
     def at_start(self, scene: Scene) -> Mapping[str, Any]:
@@ -79,12 +79,12 @@ def refuse_taken_names(scene: Scene, blocks: Iterable[StateBlock]) -> None:
         ConfigError: says which.
     """
     names = [name for block in blocks for name in block.names]
-    for number, table in enumerate(scene.config.states, start=1):
+    for where, number, table in scene.config.every_state:
         ensure(
             names.count(table.name) <= 1,
             ConfigError(
                 Problem(
-                    f"[[states]] number {number} name",
+                    f"[[{where}]] number {number + 1} name",
                     f'given "{table.name}", which another state of the motion is called already; rename it',
                 )
             ),

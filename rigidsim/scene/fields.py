@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import date, time
 from decimal import Decimal
@@ -303,16 +303,15 @@ Four = Annotated[list[T], Field(min_length=4, max_length=4), Exactly(4)]
 @dataclass(frozen=True, eq=False)
 class OneOf:
     """Annotation of a text that is one of some names, which may be registered later; ``more`` come first, and
-    last the names in a list of tables of the config, ``of_scene``.
+    last names that follow from the tables of the config, by ``of_scene``.
     """
 
     names: Iterable[str]
     more: tuple[str, ...] = ()
-    of_scene: str = ""
+    of_scene: Callable[[Mapping[str, Any]], Iterable[Any]] | None = None
 
     def _known(self, value: Any, info: Any) -> str:
-        tables = (info.context or {}).get(self.of_scene, []) if self.of_scene else []
-        own = [x.get("name") for x in tables if isinstance(x, dict)] if isinstance(tables, list) else []
+        own = self.of_scene(info.context or {}) if self.of_scene else ()
         allowed = [*self.more, *self.names, *(name for name in own if isinstance(name, str))]
         if isinstance(value, str) and value in allowed:
             return value

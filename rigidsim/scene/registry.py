@@ -17,6 +17,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import Matrix, Vector
 from rigidsim.scene.bodies.body import RigidBody
 from rigidsim.scene.epochs import Epoch
+from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import Names, origin
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import Expression, ExpressionError
@@ -30,6 +31,8 @@ from rigidsim.scene.point_masses import PointMasses
 class LoadFields(ConfigTable):
     """Base of the keys that one kind of load takes; each adds ``kind: Literal["name"]``."""
 
+    brings_state: ClassVar[bool] = False
+    """whether it carries a state that is named after it"""
     name: VariableName | None = Field(None, examples=["sun"])
     """name of the load; expressions can then read ux_NAME uy_NAME uz_NAME r_NAME shadow_NAME"""
 
@@ -38,6 +41,21 @@ class LoadFields(ConfigTable):
         on; None if there is no source at a known place.
         """
         return None
+
+    def brought_states(self) -> Sequence[BroughtState]:
+        """States that the load carries, which expressions read by their names."""
+        return []
+
+
+@dataclass(frozen=True)
+class BroughtState:
+    """A state that a load carries, by an expression of its value at the start and of its rate of change."""
+
+    name: str
+    unit: str
+    initial: str
+    derivative: str
+    parameters: Mapping[str, ExactNumber]  # of both
 
 
 class SourceFields(LoadFields):

@@ -190,7 +190,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
         setting = _setting(config, context, body, (start, end), source)
         scene = _with_loads(setting, samples, source)
         scene = scene.started(starts.attitude_of(scene))
-        return scene.started(starts.rotation_of(scene))
+        return _begun(scene.started(starts.rotation_of(scene)))
     except ConfigError as error:
         raise error.at(source) from None
 
@@ -431,6 +431,7 @@ class OwnState:
     initial: Any  # mpf
     derivative: Expression  # SI
     why: str = ""
+    begins: Expression | None = None  # of the start, from which ``initial`` follows
 
     @property
     def described(self) -> str:
@@ -456,7 +457,27 @@ def resolve_states(setting: Setting) -> list[OwnState]:
         rate = None if table.unit is None else "s^-1" if table.unit == "1" else f"{table.unit}/s"
         derivative = here.expression("derivative", table.derivative, rate, read_too=True)
         found.append(OwnState(table.name, table.unit, start.at(setting.context), derivative))
+    for number, load in enumerate(setting.config.loads):
+        here = setting.at("loads", number)
+        for x in load.brought_states():
+            slope, begins = (
+                here.expression("name", text, unit, parameters=x.parameters)
+                for text, unit in ((x.derivative, f"{x.unit}/s"), (x.initial, x.unit))
+            )
+            found.append(OwnState(x.name, x.unit, setting.context.zero, slope, begins=begins))
     return found
+
+
+def _begun(scene: Scene) -> Scene:
+    """The scene with the states that loads bring as they follow from its start."""
+    if not any(state.begins for state in scene.states):
+        return scene
+    values = start_values(scene)
+    begun = (
+        x if x.begins is None else replace(x, initial=evaluate(x.begins, values, scene.context))
+        for x in scene.states
+    )
+    return replace(scene, states=tuple(begun))
 
 
 def carried_states(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from decimal import Decimal
 from fractions import Fraction
 from functools import lru_cache, partial
@@ -75,7 +75,7 @@ from rigidsim.scene.kepler import Ellipse
 from rigidsim.scene.kernels.ephemeris import EphemerisTable
 from rigidsim.scene.paths import ARRAYS_OF_TABLES, Path
 from rigidsim.scene.point_masses import PointMassBody
-from rigidsim.scene.registry import LOADS, MESSAGES, OBSERVABLES, LoadFields
+from rigidsim.scene.registry import LOADS, MESSAGES, OBSERVABLES, BroughtState, LoadFields
 from rigidsim.scene.sample_times import Time
 from rigidsim.scene.units import UnitError
 from rigidsim.scene.validation_messages import meant, shown
@@ -234,10 +234,21 @@ class Insolation(ConfigTable):
     """irradiance at a distance of the semi-major axis"""
 
 
+def _states_of(tables: Mapping[str, Any]) -> Iterator[Any]:
+    """Names of the states of a config as it is written, also of states that loads bring."""
+    for key in ("states", "loads"):
+        listed = tables.get(key)
+        for table in listed if isinstance(listed, list) else ():
+            if isinstance(table, dict):
+                load = LOADS["kind"].get(str(table.get("kind"))) if key == "loads" else None
+                if key == "states" or (load is not None and load.Fields.brings_state):
+                    yield table.get("name")
+
+
 class Output(ConfigTable):
     """``[output]``: what is kept and how it is shown."""
 
-    record: EachOnce[Annotated[str, OneOf(OBSERVABLES, of_scene="states")]] | None = Field(
+    record: EachOnce[Annotated[str, OneOf(OBSERVABLES, of_scene=_states_of)]] | None = Field(
         None, examples=[["quaternion", "obliquity"]]
     )
     """names of the variables to record; by default variables that suit the scene (drifts of invariants are
@@ -740,6 +751,12 @@ class Config(ConfigTable):
         """Texts of tables by name."""
         return {name: table.text for name, table in self.tables.items() if table.text is not None}
 
+    @property
+    def every_state(self) -> list[tuple[str, int, OwnStateTable | BroughtState]]:
+        """``[[states]]`` and states that loads bring, each with its array of tables and the place there."""
+        found: list[tuple[str, int, Any]] = [("states", i, table) for i, table in enumerate(self.states)]
+        return found + [("loads", i, x) for i, load in enumerate(self.loads) for x in load.brought_states()]
+
     @model_validator(mode="after")
     def _tides_are_of_averages(self) -> Config:
         model = self.model
@@ -791,7 +808,10 @@ class Config(ConfigTable):
         for name in filter(None, names):
             if names.count(name) > 1:
                 raise refuse(f'two {info.field_name} are named "{name}"; give each another name')
-            if info.field_name == "states" and name in OBSERVABLES:
+        for name in (
+            x.name for x in value if info.field_name == "states" or getattr(x, "brings_state", False)
+        ):
+            if name in {*OBSERVABLES, *BODY_NAMES, *RESERVED}:
                 raise refuse(f'a state is named "{name}", as a variable that can be recorded; rename it')
         return value
 

@@ -154,10 +154,8 @@ NAMED_OTHERWISE = {
         "magnet", "magnetic", "magnetic_field", "magnetic_torque", "magnetic_moment", "dipole",
         "residual_dipole", "geomagnetic", "geomagnetic_field", "earth_magnetic_field", "igrf", "wmm",
     ),
-    "magnetic hysteresis isn't modelled; eddy_currents and viscous_torque brake in proportion to the rates, "
-    "and a law of a rod's magnetisation can be one of [[states]], which the moment of a magnetic_dipole "
-    "reads (docs/own_states.md)": (
-        "hysteresis", "hysteresis_rod", "hysteresis_damping", "hysteresis_damper", "magnetic_hysteresis",
+    "rods with magnetic hysteresis are a hysteresis_rod (docs/loads/hysteresis_rod.md)": (
+        "hysteresis", "hysteresis_damping", "hysteresis_damper", "magnetic_hysteresis",
         "permeable_rod",
     ),
     "the oblateness of a source is figure = {J2 = .., radius = .., pole = ..} of central_gravity and "

@@ -98,7 +98,7 @@ def with_recorded_variables_of(experiment: Experiment, saved: Path) -> Experimen
     output, recorded = experiment.config.output, read_attributes(saved).get("recorded")
     if output.record is not None or not recorded:
         return experiment
-    known = {*OBSERVABLES, *(table.name for table in experiment.config.states)}
+    known = {*OBSERVABLES, *(table.name for _, _, table in experiment.config.every_state)}
     names = [name for name in recorded.split() if name in known]
     config = experiment.config.model_copy(update={"output": output.model_copy(update={"record": names})})
     return replace(experiment, config=config)

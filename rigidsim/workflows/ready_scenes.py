@@ -34,7 +34,7 @@ SUBJECTS: Mapping[str, tuple[str, ...]] = {
     "Wheels, pointing, and mass that moves": (
         "intermediate_axis_with_wheel", "dual_spin_turn", "pointing_law", "pointing_with_wheels",
         "nadir_pointing",
-        "detumbling_by_magnetorquers", "slosh", "skater", "rocket_coning",
+        "detumbling_by_magnetorquers", "cubesat_with_hysteresis_rods", "slosh", "skater", "rocket_coning",
     ),
     "The Earth, the Moon and other bodies": (
         "earth_free_nutation", "earth_free_nutation_axes", "earth_free_core_nutation",

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 WANTED = {
     "[[rotors]]": "reaction_wheel momentum_wheel flywheel wheel gyrostat control_moment_gyro cmg vscmg",
     "magnetic_dipole": "magnetorquer torque_rod coil magnet residual_dipole bdot geomagnetic_field igrf",
-    "hysteresis isn't modelled": "hysteresis hysteresis_rod magnetic_hysteresis",
+    "are a hysteresis_rod": "hysteresis magnetic_hysteresis permeable_rod",
     "figure = {J2": "j2 oblateness zonal_harmonic j2_perturbation",
     "gravity_field": "spherical_harmonic geopotential gravity_model egm96 egm2008",
     "[[bodies]]": "third_body perturber point_mass lunisolar third_body_perturbation",

@@ -8,6 +8,7 @@ from rigidsim.model.loads import (  # noqa: F401  (each enters its kinds; a new 
     applied,
     changing_tensor,
     gravity,
+    hysteresis_rod,
     inner_bodies,
     magnetic_field,
     rigid_bodies,

@@ -1,5 +1,6 @@
 """Magnetic fields: uniform, of a dipole along an orbit or in flight, or the Earth's; what they do to a
-magnetic moment and to a conductor that turns; and ``bx by bz``, the field where the body is, body axes.
+magnetic moment and to a conductor that turns; and ``bx by bz``, the field where the body is, with its rate of
+change there ``dbx dby dbz``, body axes.
 """
 
 from __future__ import annotations
@@ -55,6 +56,7 @@ from rigidsim.scene.space_axes import earth_axes, rotation_rate
 from rigidsim.scene.swept import plain
 
 FIELD_NAMES = ("bx", "by", "bz")
+CHANGE_NAMES = ("dbx", "dby", "dbz")
 IGRF = "igrf"
 _LEAST = 0.99
 """Radii from the centre below which a start is refused; the poles are at 0.998."""
@@ -192,7 +194,43 @@ class UniformField:
 
     def at_start(self, scene: Scene) -> Vector:
         """B at the start, space axes, T (mpf)."""
+        return self.at(scene.context, [] if self.uniform else self.placement.at_start(scene), scene.start)
+
+    def at(self, context: Any, place: Vector, time: Any) -> Vector:
+        """B where the source is at a place (m) as seen from the body, space axes, T (mpf)."""
         return self.source
+
+    def change(self, m: Kinematics) -> list[Symbolic]:
+        """Derivative of ``over_size`` along the orbit or flight, per internal unit of time, space axes."""
+        if self.uniform:
+            return [hy.expression(0.0)] * 3
+        if self.placement.orbit is not None:
+            block = m.orbit(self.placement.orbit).block
+            moving = list(zip(block.variables, block.derivatives, strict=True))
+        else:
+            ratio = m.scaled(1, m.scaling.speed + m.scaling.time - m.scaling.length)
+            pairs = zip(m.carried(m.position), m.carried(m.velocity), strict=True)
+            moving = [(x, ratio * v) for x, v in pairs]
+        moment = hy.make_vars("moment")  # heyoka doesn't differentiate by time
+        field = hy.subs(self.over_size(m), {hy.time: moment})
+        rates = [hy.sum([hy.diff(x, by) * y for by, y in [*moving, (moment, 1.0)]]) for x in field]
+        return list(hy.subs(rates, {moment: hy.time}))
+
+    def change_at_start(self, scene: Scene) -> Vector:
+        """The same at the start, T/s (mpf), by a central difference that leaves a third of the digits."""
+        context, placement = scene.context, self.placement
+        if self.uniform:
+            return [context.zero] * 3
+        if placement.orbit is not None:
+            place, velocity, _ = placement.motion_at_start(scene)
+        else:
+            place, velocity = placement.at_start(scene), [-v for v in placement.velocity_at_start(scene)]
+        step = context.ldexp(norm(context, place) / norm(context, velocity), -context.prec // 3)
+        before, after = (
+            self.at(context, [x + s * v for x, v in zip(place, velocity, strict=True)], scene.start + s)
+            for s in (-step, step)
+        )
+        return [(x - y) / (2 * step) for x, y in zip(after, before, strict=True)]
 
 
 class DipoleField(UniformField):
@@ -219,8 +257,7 @@ class DipoleField(UniformField):
         across = 3.0 * along(unit, place.line)
         return [falling * (across * x - e) for e, x in zip(unit, place.line, strict=True)]
 
-    def at_start(self, scene: Scene) -> Vector:
-        place, context = self.placement.at_start(scene), scene.context
+    def at(self, context: Any, place: Vector, time: Any) -> Vector:
         far = norm(context, place)
         across, size = dot(self.source, place) / far, context.mpf(_FIELD_CONSTANT) / far**3
         return [size * (3 * across * x / far - e) for e, x in zip(self.source, place, strict=True)]
@@ -252,9 +289,8 @@ class EarthField(DipoleField):
             m.made[which] = self.harmonics.vector(m, place, lambda n: ratio ** (n + 2) / size)
         return m.made[which]
 
-    def at_start(self, scene: Scene) -> Vector:
-        place = [-x for x in self.placement.at_start(scene)]
-        return self.harmonics.at(scene.context, place, scene.start)
+    def at(self, context: Any, place: Vector, time: Any) -> Vector:
+        return self.harmonics.at(context, [-x for x in place], time)
 
 
 def field_of(fields: MagneticFieldFields, around: Setting) -> UniformField:
@@ -373,7 +409,9 @@ class InMagneticField(Placed):
     def read_by(self, names: frozenset[str]) -> bool:
         """On an orbit, whose states it brings: its field, or names of its source."""
         own = f"_{self.name} " if self.name else " no name "
-        return self.orbit is not None and any(x in FIELD_NAMES or own in f"{x} " for x in names)
+        return self.orbit is not None and any(
+            x in (*FIELD_NAMES, *CHANGE_NAMES) or own in f"{x} " for x in names
+        )
 
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
@@ -398,12 +436,20 @@ class InMagneticField(Placed):
         size = rounded(m.number(self.field.size(m.scene)))
         return [size * x for x in self.b(m)]
 
+    def flux_change(self, m: Kinematics) -> list[Symbolic]:
+        """Rate at which the field changes in the body's axes, T/s: R^T B' - w x B."""
+        if all(x == 0 for x in self.field.source):
+            return [hy.expression(0.0)] * 3
+        size = rounded(m.number(m.scene.context.ldexp(self.field.size(m.scene), -m.scaling.time)))
+        turned = cross(self.b(m), m.rates)
+        return [size * (x + y) for x, y in zip(m.seen(self.field.change(m)), turned, strict=True)]
+
 
 @provides
 class FieldNames(NameProvider):
     """The sum of all fields, in which one that several loads give counts once."""
 
-    brings = "bx, by, bz with the field of a magnetic_dipole"
+    brings = "bx, by, bz and dbx, dby, dbz with the field of a magnetic_dipole"
 
     def names(self, config: Config) -> Iterable[Readable]:
         """See ``NameProvider``."""
@@ -411,28 +457,42 @@ class FieldNames(NameProvider):
         for fields in config.loads:
             if isinstance(fields, MagneticFieldFields):
                 found, states = True, states | (fields.placed_by(free_flight=flies) or set())
-        return (Readable(name, "T", frozenset(states)) for name in FIELD_NAMES if found)
+        for names, unit in ((FIELD_NAMES, "T"), (CHANGE_NAMES, "T/s")):
+            yield from (Readable(name, unit, frozenset(states)) for name in names if found)
 
     def at_start(self, scene: Scene) -> Mapping[str, Any]:
         """See ``NameProvider``."""
-        if not read_in(scene) & set(FIELD_NAMES):
-            return {}
-        found = [load.field.at_start(scene) for load in _fields_of(scene)]
-        return dict(zip(FIELD_NAMES, in_body_axes(scene, _total(found)), strict=True))
+        values: dict[str, Any] = {}
+        if not read_in(scene) & {*FIELD_NAMES, *CHANGE_NAMES}:
+            return values
+        fields = [load.field for load in _fields_of(scene)]
+        b = in_body_axes(scene, _total([field.at_start(scene) for field in fields]))
+        values |= zip(FIELD_NAMES, b, strict=True)
+        if read_in(scene) & {*CHANGE_NAMES}:
+            changes = in_body_axes(scene, _total([field.change_at_start(scene) for field in fields]))
+            turned = cross(b, scene.angular_velocity)
+            values |= zip(CHANGE_NAMES, [x + y for x, y in zip(changes, turned, strict=True)], strict=True)
+        return values
 
     def at_random(
         self, scene: Scene, start: Mapping[str, Any], generator: random.Random
     ) -> Mapping[str, Any]:
-        """Any field, about as large as at the start."""
-        size = norm(scene.context, list(start.values())) if start else scene.context.zero
-        return {name: size * scene.context.mpf(generator.gauss(0, 1)) for name in start}
+        """Any field and change, about as large as at the start."""
+        found: dict[str, Any] = {}
+        for names in (FIELD_NAMES, CHANGE_NAMES):
+            values = [start[name] for name in names if name in start]
+            size = norm(scene.context, values) if values else scene.context.zero
+            found |= {x: size * scene.context.mpf(generator.gauss(0, 1)) for x in names if x in start}
+        return found
 
     def expressions(self, m: Kinematics, names: Collection[str]) -> Mapping[str, Any]:
         """See ``NameProvider``."""
-        if not set(names) & set(FIELD_NAMES):
-            return {}
-        found = [load.flux_density(m) for load in _fields_of(m.scene)]
-        return dict(zip(FIELD_NAMES, _total(found), strict=True))
+        loads, found = _fields_of(m.scene), dict[str, Any]()
+        if set(names) & {*FIELD_NAMES}:
+            found |= zip(FIELD_NAMES, _total([load.flux_density(m) for load in loads]), strict=True)
+        if set(names) & {*CHANGE_NAMES}:
+            found |= zip(CHANGE_NAMES, _total([load.flux_change(m) for load in loads]), strict=True)
+        return found
 
 
 def _total(vectors: list[list[Any]]) -> list[Any]:

@@ -154,8 +154,8 @@ def _taken(config: Any, name: str, brings: tuple[str, str]) -> Problem:
     """Where a name is given that another thing has in expressions; ``brings`` of both providers."""
     both = "; ".join(filter(None, brings))
     what = f'two things are called "{name}" in expressions ({both}); rename one'
-    numbers = [number for number, state in enumerate(config.states, start=1) if state.name == name]
-    return Problem(f"[[states]] number {numbers[-1]} name" if numbers else "names", what)
+    found = [f"[[{where}]] number {i + 1} name" for where, i, x in config.every_state if x.name == name]
+    return Problem(found[-1] if found else "names", what)
 
 
 # --- time and the body's own --------------------------------------------------------------------------------

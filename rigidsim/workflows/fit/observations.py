@@ -99,7 +99,7 @@ def observing(experiment: Experiment) -> Iterator[tuple[list[Observed], Experime
     table = experiment.config.fit
     assert table is not None
     texts = [data.observable for data in table.data]
-    own = [state.name for state in experiment.config.states]
+    own = [state.name for _, _, state in experiment.config.every_state]
     names, also, entered = [], list[str](), list[str]()
     try:
         for number, text in enumerate(texts, start=1):

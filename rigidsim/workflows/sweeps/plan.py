@@ -124,7 +124,7 @@ def _tried(sweep: Sweep, most: int) -> Iterator[int]:
 
 def _refuse_names(sweep: Sweep) -> None:
     """Refuse names that the dataset needs itself, and what is to be kept of events where there are none."""
-    states = [table.name for table in sweep.base.config.states]
+    states = [table.name for _, _, table in sweep.base.config.every_state]
     taken = RESERVED | {*OBSERVABLES, *states} | (OF_FITS if sweep.fits else set())
     problems = []
     for number, name in enumerate(states, start=1):
