@@ -4,7 +4,6 @@ from typing import Any
 
 import mpmath
 import numpy as np
-from hypothesis import strategies as st
 from support import config
 
 import rigidsim
@@ -77,40 +76,12 @@ def attitude_error(exact: list[Any], quaternion: Any) -> float:
     return 2 * float(mpmath.sqrt(sum((a - float(b)) ** 2 for a, b in zip(exact, quaternion, strict=True))))
 
 
-def differ(a: list[Any], b: list[Any]) -> float:
-    """Largest difference of two vectors."""
-    return max(float(abs(x - y)) for x, y in zip(a, b, strict=True))
-
-
-@st.composite
-def bodies(draw: st.DrawFn) -> list[float]:
-    """Principal moments of any body: rods, plates, near-symmetric and spherical ones among them."""
-    small = st.one_of(st.floats(1e-3, 1), st.integers(-15, -1).map(lambda n: 10.0**n))
-    a, b = 1.0, draw(small)
-    lowest, highest = abs(a - b), a + b
-    share = draw(st.one_of(st.floats(0, 1), small, small.map(lambda x: 1 - x)))
-    c = min(max(lowest + share * (highest - lowest), 1e-15), highest)
-    return list(draw(st.permutations([a, b, c])))
-
-
-def vectors(count: int) -> st.SearchStrategy[list[float]]:
-    """Components of very different size among them, not all zero."""
-    component = st.one_of(
-        # far smaller ones are beyond what the internal arithmetic holds, and refused
-        st.floats(-1, 1).map(lambda x: x if abs(x) > 1e-200 else 0.0),
-        st.integers(-15, 0).map(lambda n: 10.0**n),
-        st.just(0.0),
-        st.just(1.0),
-    )
-    return st.lists(component, min_size=count, max_size=count).filter(lambda v: max(abs(x) for x in v) > 1e-3)
-
-
 TILTED = (4, 3, 2, 1)
 LEVEL = (1, 1, 0, 0)
 
 
-def _free(moments: Any, rates: Any, quaternion: Any = TILTED) -> dict[str, Any]:
-    return {"body": principal(moments), "rates": rates, "quaternion": quaternion}
+def _free(moments: Any, rates: Any) -> dict[str, Any]:
+    return {"body": principal(moments), "rates": rates, "quaternion": TILTED}
 
 
 def _heavy(body: str, rates: Any, quaternion: Any = TILTED) -> dict[str, Any]:

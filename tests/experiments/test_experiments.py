@@ -102,9 +102,3 @@ def test_closed_forms_agree_with_quadrature() -> None:
             assert abs(energy - start) < mpmath.mpf("1e-25")
         quarter = mpmath.ellipk(heavy.m)
         assert abs(mpmath.quad(azimuth, [0, quarter]) / quarter - heavy.precession) < mpmath.mpf("1e-20")
-
-
-# ---- every peer integrates the same motion; costs are read off curves rightly; absence is said, not hidden
-
-
-# ---- the study of long runs: its fit knows the laws, and its measurement the closed form

@@ -98,6 +98,3 @@ def test_its_keys_are_checked_like_any_others() -> None:
         rigidsim.parse(config(loads=WIRE.replace("frequency", "frequncy")))
     with pytest.raises(ConfigError, match="torsion_wire"):  # the nearest of all kinds, this one among them
         rigidsim.parse(config(loads=WIRE.replace("torsion_wire", "torsion_wires")))
-
-
-# --- loads that share an orbit ------------------------------------------------------------------------------

@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from killing import killed
-from support import angle_between, config, loaded, run_text, same_bits
+from support import angle_between, config, loaded, run_text
 
 import rigidsim
 from rigidsim.model.system import System
@@ -161,20 +160,3 @@ def test_it_records_a_dataset_with_true_errors_of_its_own(tmp_path: Path) -> Non
     assert true <= accuracy["estimated_attitude_error"] <= 100 * true
     assert "steps of half the size" in accuracy["estimated_how"]
     assert rigidsim.verify(run.folder.path).identical
-
-
-SHORT = {"time": "end = 6\nsamples = 25"}
-
-
-@pytest.mark.slow
-@pytest.mark.optimised  # as in the process that is killed
-def test_a_killed_run_resumes_bit_for_bit(tmp_path: Path) -> None:
-    given = text(1e-4, **SHORT)
-    whole = run_text(given, estimate=True)
-    done = rigidsim.resume(killed("test_a_solver", given, tmp_path))
-    assert done.summary["cost"]["sessions"] == 2
-    same_bits(whole, done)
-    for name in ("steps", "smallest_step", "largest_step"):
-        assert done.summary["cost"][name] == whole.summary["cost"][name]
-    announced = [run.summary["accuracy"]["estimated_attitude_error"] for run in (whole, done)]
-    assert announced[0] == announced[1]

@@ -77,10 +77,10 @@ METHODS = {"taylor": 1e-16, "runge_kutta": 1e-6}
 SPIN = 0.5  # rad/s
 
 
-def text(method: str, samples: int = 201, end: float = 20.0, name: str = "driven_by_impulses") -> str:
+def text(method: str, samples: int = 201, end: float = 20.0) -> str:
     """Of a body that turns about its z axis."""
     return config(
-        name=name,
+        name="driven_by_impulses",
         body="principal_moments = [1, 1, 2]",
         initial=f"angular_velocity = [0, 0, {SPIN}]",
         time=f"end = {end}\nsamples = {samples}",
@@ -110,10 +110,15 @@ def test_the_motion_is_that_of_the_impulses(case: tuple[str, int]) -> None:
 @pytest.mark.optimised  # as in the process that is killed
 @pytest.mark.parametrize("method", cases(METHODS, []))
 def test_a_killed_run_resumes_bit_for_bit(method: str, tmp_path: Path) -> None:
-    given = text(method, 25, 6.0)
+    given = text(method, 25, 6.0).replace("estimate = false", "estimate = true")
+    whole = run_text(given, estimate=True)
     done = rigidsim.resume(killed("test_an_effect", given, tmp_path))
     assert done.summary["cost"]["sessions"] == 2
-    same_bits(run_text(given), done)
+    same_bits(whole, done)
+    for name in ("steps", "smallest_step", "largest_step"):
+        assert done.summary["cost"][name] == whole.summary["cost"][name]
+    announced = [run.summary["accuracy"]["estimated_attitude_error"] for run in (whole, done)]
+    assert announced[0] == announced[1]
     assert rigidsim.verify(done.folder.path).identical
 
 

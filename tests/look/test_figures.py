@@ -16,7 +16,7 @@ from rigidsim.look.pages import numbers
 
 Build = Callable[..., xarray.Dataset]
 
-DAY, YEAR = 86400.0, 365.25 * 86400
+DAY = 86400.0
 MAS = np.pi / 180 / 3600e3
 ARCSEC = 1000 * MAS
 
@@ -122,6 +122,16 @@ def test_polhode_lies_on_both_surfaces_and_the_separatrix_on_its_plane(symmetric
         "Polhode: the surfaces of energy and momentum",
         "It rolls on the invariable plane (Poinsot)",
     ]
+
+
+def test_a_thin_plate_wobbles_twice_a_turn(symmetric_top: Build) -> None:
+    """I = (1, 1, 2): the axis turns by L t / A about L, the body by L cos(theta) / C about the axis."""
+    dataset = symmetric_top()
+    (axes,) = figures.figure(dataset, "wobble").axes
+    wobble, spin = (line.get_ydata()[-1] for line in axes.get_lines())
+    momentum, end = np.linalg.norm(dataset["angular_momentum"].values[0]), float(dataset["time"][-1])
+    assert wobble == pytest.approx(momentum * end / (2 * np.pi), rel=1e-6)
+    assert wobble / spin == pytest.approx(2 / np.cos(0.5), rel=1e-9)
 
 
 def test_drifts_stand_over_the_band_of_rounding(symmetric_top: Build) -> None:

@@ -12,7 +12,6 @@ from rigidsim.look.figures.catalogue import figure
 from rigidsim.look.stages.registry import build_picture
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-BLUE, ORANGE, GREY = (70, 118, 190), (200, 96, 62), (92, 94, 100)
 
 
 def short(name: str, end: float) -> xarray.Dataset:

@@ -97,6 +97,14 @@ def test_gradient_torque_of_a_body_on_an_orbit(shape: str) -> None:
         )
 
 
+def test_rates_are_bounded_by_what_the_gradient_of_a_nearly_round_body_can_give() -> None:
+    """Released at rest across a fixed source, it swings through at I3 w^2 = 3 K (I2 - I1)."""
+    load = 'kind = "gravity_gradient"\ngravitational_parameter = 1\nposition = [1, 0, 0]'
+    system = prepared("principal_moments = [1, 1.02, 1.02]", "angular_velocity = [0, 0, 0]", load).system
+    fastest = np.sqrt(3 * 0.02 / 1.02)
+    assert fastest <= float(system.rate_bound) <= 2 * fastest
+
+
 @pytest.mark.parametrize("formulation", ["quaternion", "rates"])
 def test_damping_in_proportion_to_inertia(formulation: str) -> None:
     """tau = -c I w: abs(L) = L0 exp(-c t), E = E0 exp(-2 c t), the direction of L stays."""

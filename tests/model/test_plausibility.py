@@ -18,7 +18,6 @@ from rigidsim.session.understood import cautions_of
 
 ROOT = Path(__file__).parents[2]
 EARTH = 'gravitational_parameter = "3.986004418e14 m^3/s^2"\n'
-SUN = "gravitational_parameter = 1.32712440018e20\n"
 MOON = 'semi_major_axis = "384400 km", eccentricity = 0.0549, inclination = "5.145 deg"'
 MONTHS = 'node_rate = "-19.34 deg/yr", periapsis_rate = "60.0 deg/yr"'
 
@@ -52,11 +51,17 @@ def torque(*components: str) -> str:
     return scene(f'[[loads]]\nkind = "torque"\ncomponents = {list(components)}')
 
 
-def month(pace: str, asymmetry: float, turn: float = 27.321661) -> str:
-    """The Moon, with an equator of any shape: a turn takes a sidereal month, or so many days."""
-    start = f'angular_velocity = [0, 0, "{2 * math.pi / turn!r} rad/day"]'
+def month(pace: str, asymmetry: float) -> str:
+    """The Moon, with an equator of any shape: a turn takes a sidereal month."""
+    start = f'angular_velocity = [0, 0, "{2 * math.pi / 27.321661!r} rad/day"]'
     moments = f"1, {1 + asymmetry!r}, 1.0006"
     return scene(orbit(f"{MOON}, {MONTHS}, {pace}"), start, moments)
+
+
+def turned(angles: str, keys: str = "inclination = 1") -> str:
+    """About an orbit of the Earth, from Euler angles."""
+    start = f"angular_velocity = [40, 60, 1000]\neuler_angles = {angles}"
+    return scene(orbit(f"semi_major_axis = 7e6, {keys}"), start)
 
 
 def warned(text: str) -> list[Caution]:
@@ -92,6 +97,20 @@ IMPLAUSIBLE = {
         "components[0]: given sin(30), whose argument is taken as radians: 1718.87 "
         "deg; write sin(30 deg) if degrees are meant, sin(30 rad) if not",
     ),
+    "angles in degrees": (
+        turned("[40, 60, 30]"),
+        "angle_without_unit",
+        "[initial] euler_angles: given 40, 60, 30 without a unit, which is taken as radians: "
+        '2291.83, 3437.75, 1718.87 deg; write "40 deg" if degrees are meant, "40 rad" if not',
+    ),
+    "one angle": (turned('[0, "-23.5", 0]'), "angle_without_unit", "euler_angles: given -23.5 without"),
+    "an inclination": (turned("[0, 1, 0]", "inclination = 51.6"), "angle_without_unit", "orbit.inclination"),
+    "an anomaly": (turned("[0, 1, 0]", 'mean_anomaly = "100"'), "angle_without_unit", "orbit.mean_anomaly"),
+    "an end in the unit of times": (
+        turned("[0, 1, 0]").replace("end = 1000", 'end = 30\nunit = "day"'),
+        "time_without_unit",
+        '[time] end: given 30 without a unit, which is taken as seconds: 0.000347 day; write "30 day" if',
+    ),
     "a sidereal month as the anomalistic one": (
         month('period = "27.321661 day"', 5e-6),
         "near_resonance",
@@ -117,6 +136,9 @@ PLAUSIBLE = {
     ).replace("mass = 100", "mass = 5.9722e24"),
     "a fall": flight('["7000 km", 0, 0]', "[0, 0, 0]"),
     "gravity upwards elsewhere": gravity("[0, 0, 3.71]"),
+    "turns in radians": turned("[6.28, -6.28, 0]"),
+    "angles said": turned('["40 deg", "-10*pi/3", "20 pi"]'),
+    "an end said": turned("[0, 1, 0]").replace("end = 1000", 'end = "30 s"\nunit = "day"'),
     "radians": torque("sin(3)", "cos(t + 30)", "sin(30*t)"),
     "a tumbling moon": month('period = "27.321661 day"', 5e-6).replace(
         "[0, 0, ", '["0.1 rad/day", "0.2 rad/day", '

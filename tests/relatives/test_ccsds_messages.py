@@ -415,6 +415,10 @@ def test_every_command_reads_the_same(seed: int, tmp_path: Path) -> None:
 
     path.write_text(wrong_way(path.read_text()))
     assert rigidsim.compare(rigidsim.parse(scene), path).verdict != "agrees"
+    (about,) = set(given.frames) & set(SPACE)
+    path.write_text(given.text().replace(about, "MARS_IAU"))
+    with pytest.raises(rigidsim.RigidsimError, match="attitudes and orbits about one of EME2000"):
+        rigidsim.fit(rigidsim.load(tmp_path / "top.toml"))
 
 
 def changed(old: str, new: str) -> Callable[[str], str]:

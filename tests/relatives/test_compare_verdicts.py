@@ -79,6 +79,17 @@ def test_a_wrong_rate_is_no_rounding_of_even_times(seed: int) -> None:
         assert rigidsim.compare(scene, kept[1]).verdict == "agrees"
 
 
+@pytest.mark.parametrize(("delay", "verdict"), [(0.0, "agrees"), (1.4e-3, "undecided")])
+def test_even_times_of_two_decimals_explain_what_they_may(delay: float, verdict: str) -> None:
+    """Their rounding goes slowly along the file; a delay that does, too, isn't one of half a digit."""
+    rows = np.arange(321)
+    half = -0.03 * (3.01002 * rows + delay * np.sin(2 * np.pi * rows / 125)) / 2
+    q = np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
+    found = rigidsim.compare(rigidsim.parse(SPIN), {"t": np.round(3.01002 * rows, 2), "q": q})
+    assert found.verdict == verdict
+    assert ("its times, which are rounded" in found.why) == (verdict == "agrees")
+
+
 @pytest.mark.parametrize("seed", seeds(1, 60))
 def test_another_body_is_no_integration_error_in_rows_far_apart(seed: int) -> None:
     """A free symmetric body in closed form: L / A turns it about L, and it turns about its axis beside."""

@@ -41,12 +41,12 @@ class Mixed(Load):
 
 
 class Wheel(Load):
-    """A wheel along z whose motor follows the rate: h' = k w_z - h / tau."""
+    """A wheel along z whose motor follows the rate, h' = k w_z - h / tau; its energy is h^2 / 2 J."""
 
     title = "wheel"
 
-    def __init__(self, gain: float, lag: float) -> None:
-        self.gain, self.lag = gain, lag
+    def __init__(self, gain: float, lag: float, moment: float) -> None:
+        self.gain, self.lag, self.moment = gain, lag, moment
 
     def extra_states(self, m: Any) -> StateBlock:
         return StateBlock(["held"], [self._slope(m)], [0], exponents=[m.units.momentum])
@@ -58,13 +58,13 @@ class Wheel(Load):
         return [([0, 0, 1], hy.make_vars("held"))]
 
     def carried_energy(self, m: Any) -> Any:
-        return None
+        return 0.5 / self.moment * hy.make_vars("held") ** 2.0
 
     def exerted_torque(self, m: Any) -> Any:
         return [([0, 0, -1], self._slope(m))]
 
     def supplied_power(self, m: Any) -> Any:
-        return self.gain * m.rates[2] ** 2.0
+        return self._slope(m) * (hy.make_vars("held") / self.moment - m.rates[2])
 
     def carried_at_start(self, scene: Any) -> Any:
         return [scene.context.zero] * 3, scene.context.zero
@@ -159,7 +159,15 @@ def test_a_carrier_in_si_turns_the_body_as_its_formulas_say(seed: int) -> None:
     rate, inertia = 10 ** rng.uniform(-6, 2), 10 ** rng.uniform(-8, 30)
     given = scene(rng, 3 / rate, rate, inertia)
     gain, lag = 0.4 * inertia * rate, 1.5 / rate
-    run = rigidsim.run(given, out=None, loads=[Wheel(gain, lag)])
+    run = rigidsim.run(given, out=None, loads=[Wheel(gain, lag, 0.3 * inertia)])
+    assert run.dataset.attrs["python_loads"] == "Wheel"
+    assert run.summary["bit_for_bit"]["claim"] is False  # the config alone doesn't hold it
+    # the motor's torque is an inner one: the whole momentum stays, and the energy changes by its work
+    rows = run.summary["invariants"]
+    assert {"energy_balance", "angular_momentum"} <= set(rows)
+    assert not {"energy", "angular_momentum_axial", "rotational_energy"} & set(rows)
+    assert all(row["largest_drift"] <= row["bound"] for row in rows.values())
+    assert np.ptp(run.dataset.energy.values) > 1e-3 * inertia * rate**2
     moments = np.array(given["body"]["principal_moments"])
 
     def slope(time: float, state: np.ndarray) -> np.ndarray:
@@ -173,6 +181,17 @@ def test_a_carrier_in_si_turns_the_body_as_its_formulas_say(seed: int) -> None:
     found = solve_ivp(slope, (0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-13 * scales).y
     rates = run.dataset.angular_velocity.values
     np.testing.assert_allclose(rates / rate, found[:3].T / rate, rtol=0, atol=1e-9)
+
+
+def test_what_knows_the_body_alone_refuses_a_carrier() -> None:
+    orbit = {"kind": "gravity_gradient", "gravitational_parameter": 1, "orbit": {"semi_major_axis": 1}}
+    for more, told in (
+        ({"integrator": {"formulation": "canonical"}, "loads": [orbit]}, "wheel carries angular momentum"),
+        ({"model": {"level": "spin_averaged"}, "loads": [orbit]}, "wheel carries angular momentum"),
+        ({"integrator": {"method": "closed_form"}}, "a load given from Python has no closed form"),
+    ):
+        with pytest.raises(rigidsim.ConfigError, match=told):
+            rigidsim.run(scene(random.Random(1), 1, 1, 1) | more, out=None, loads=[Wheel(1, 1, 1)])
 
 
 @pytest.mark.parametrize(("load", "told"), [(Scaled(), "leave out factors"), (Timed(), "write m.time")])

@@ -271,7 +271,6 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
         assert f"file: can't be read: {why}" in str(caught.value)
 
 
-@pytest.mark.parametrize("command", ["run"])
 @pytest.mark.parametrize(
     ("tables", "where", "phrases"),
     [
@@ -280,12 +279,11 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
     ],
 )
 def test_the_command_line_says_it_and_leaves_no_folder(
-    tmp_path: Path, command: str, tables: dict[str, str | None], where: str, phrases: list[str]
+    tmp_path: Path, tables: dict[str, str | None], where: str, phrases: list[str]
 ) -> None:
     path, out = tmp_path / "bad.toml", tmp_path / "runs"
     path.write_text(config(**tables), encoding="utf-8")
-    arguments = [command, str(path)] + (["--out", str(out)] if command == "run" else [])
-    result = CliRunner().invoke(app, arguments)
+    result = CliRunner().invoke(app, ["run", str(path), "--out", str(out)])
     assert result.exit_code == 2
     assert result.stdout == ""
     assert result.stderr.startswith(f"rigidsim: {path}: 1 problem in the config\n  {where}: ")

@@ -12,12 +12,7 @@ from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.expressions.names import BODY_NAMES
 from rigidsim.scene.expressions.parser import parse_expression
-from rigidsim.scene.expressions.tree import (
-    Constant,
-    Expression,
-    ExpressionError,
-    evaluate,
-)
+from rigidsim.scene.expressions.tree import Constant, Expression, ExpressionError, evaluate
 from rigidsim.scene.scene import build_scene
 
 PAGE = Path(__file__).parents[2] / "docs" / "expressions.md"

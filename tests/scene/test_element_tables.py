@@ -74,10 +74,7 @@ REFUSED = {
         "has no column semi_major_axis; add one, or give semi_major_axis with table",
     ),
     "too short": (with_table(rows(every=7.0)), "but the run goes from 0.0 s to 5184000.0 s"),
-    "a rate": (
-        with_table(rows(), ', node_rate = "1 deg/day"'),
-        "given node_rate with table, which",
-    ),
+    "a rate": (with_table(rows(), ', node_rate = "1 deg/day"'), "given node_rate with table, which"),
     "turns": (with_table(rows(shift=-95.0)), "whole turns can't be counted"),
     "hyperbola": (with_table(rows().replace("0.02", "1.02")), "row 1: eccentricity is out of range"),
 }

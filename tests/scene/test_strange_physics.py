@@ -20,8 +20,6 @@ from rigidsim.session.understood import cautions_of
 from rigidsim.solve.problem import prepare
 
 FIGURE = 'figure = {J2 = %s, radius = "%s", pole = %s}'
-LOAD = '[[loads]]\nkind = "gravity_gradient"\nsource = "earth"\n'
-LONG = "a" * 5000
 
 
 def orbit(body: str = "", load: str = "") -> str:
@@ -39,10 +37,6 @@ def lumps(coefficients: str, radius: str = "1.7e6") -> str:
     return field_scene(f"{{radius = {radius}, {coefficients}}}", degree=3)
 
 
-def figure(j2: float = 1e-3, radius: str = "6378 km", pole: str = "[0, 0, 1]") -> str:
-    return orbit(load=FIGURE % (j2, radius, pole))
-
-
 REFUSED = {
     "a module": (moon("os"), "which is no installed package of an ephemeris"),
     "no kernel": (moon().replace('[ephemeris]\nkernel = "de421"\n', ""), "neither [[bodies]] nor an [ephem"),
@@ -55,7 +49,7 @@ REFUSED = {
     "a source in the field's radius": (lumps('C = {"3,0" = 1e-6}', "1e9"), "1e+06 km of [body]"),
     "friction without end": (orbit("core = {moment = 1e-3, friction = 1e10}"), "core.friction: given 1e+10"),
     "a pole beyond its theory": (
-        figure(pole='"iau1976"').replace('"10 day"', '"9000 yr"'),
+        orbit(load=FIGURE % (1e-3, "6378 km", '"iau1976"')).replace('"10 day"', '"9000 yr"'),
         "90 centuries from J2000",
     ),
     "the Earth's pole elsewhere": (

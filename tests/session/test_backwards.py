@@ -45,11 +45,7 @@ def test_the_same_motion_is_found_from_its_other_end(formulation: str) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    cases(
-        [path.stem for path in CONFIGS],
-        ["satellite_libration", "earth_precession_averaged"],
-        daily=2,
-    ),
+    cases([path.stem for path in CONFIGS], ["satellite_libration", "earth_precession_averaged"], daily=2),
 )
 def test_ready_scenes_come_back_to_their_start(name: str) -> None:
     """From the end of a hundred units of their own time, within what both ways announce."""

@@ -13,7 +13,6 @@ import rigidsim
 from rigidsim.scene.epochs import parse_epoch
 
 FLYBY = parse_epoch("2029-04-13T21:46:00 TDB")
-J2000 = Fraction(2451545)
 FLIP = '[[events]]\nname = "flip"\nexpression = "t - 1"\n'
 
 

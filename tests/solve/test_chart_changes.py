@@ -17,9 +17,7 @@ EULER = 'integrator.formulation="euler_angles"'
 
 
 def tumbling(
-    sequence: str,
-    start: str = "quaternion = [0.7, 0.4, 0.5, 0.3]",
-    time: str = "end = 100\nsamples = 1001",
+    sequence: str, start: str = "quaternion = [0.7, 0.4, 0.5, 0.3]", time: str = "end = 100\nsamples = 1001"
 ) -> str:
     """A body that turns over about its middle axis, through all attitudes."""
     start = f"angular_velocity = [0.3, 1.0, 0.5]\n{start}"

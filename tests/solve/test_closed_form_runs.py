@@ -5,16 +5,7 @@ import random
 from typing import Any
 
 import pytest
-from closed_scenes import (
-    DOWN,
-    EXTREMES,
-    LIMITS,
-    TILTED,
-    against_integration,
-    principal,
-    scene_over,
-    top,
-)
+from closed_scenes import DOWN, EXTREMES, LIMITS, TILTED, against_integration, principal, scene_over, top
 from support import cases
 
 SPAN = 8  # internal units of time: the fastest rate is at most 1

@@ -11,8 +11,6 @@ import rigidsim
 
 pytestmark = pytest.mark.optimised
 
-x, v = hy.make_vars("x", "v")
-
 
 def test_a_second_run_compiles_nothing_and_is_the_same(
     monkeypatch: pytest.MonkeyPatch, free_body: Callable[..., str]
@@ -26,6 +24,3 @@ def test_a_second_run_compiles_nothing_and_is_the_same(
     monkeypatch.setattr(hy, "taylor_adaptive", compiled)
     monkeypatch.setattr(hy, "cfunc", compiled)
     same_bits(first, rigidsim.run(experiment, out=None))
-
-
-# ---- compiling doesn't keep Ctrl-C waiting

@@ -77,9 +77,6 @@ def test_an_unfinished_run_opens_and_is_not_overwritten(
 
 # ---- ``summary.json``: what is written is what is read; what isn't a summary is refused
 
-# hundreds of turns between samples, of a quaternion that matrices don't carry: a warning is certain
-
-
 DAMAGES: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "a text for a number": (lambda s: s["cost"].update(steps="7"), "'cost.steps': Input should be"),
     "no number": (lambda s: s["invariants"]["energy"].update(scale=math.nan), "invariants.energy.scale"),
@@ -103,6 +100,3 @@ def test_a_damaged_summary_is_refused_by_its_place(finished: rigidsim.Run) -> No
         with pytest.raises(RunFolderError, match="is damaged or no summary of rigidsim") as refusal:
             rigidsim.open_run(path.parent)
         assert place in str(refusal.value)
-
-
-# ---- what takes the place of a file or folder is whole, or nothing changes

@@ -57,10 +57,10 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def turning(folder: Path, shift: float = 0.0) -> np.ndarray:
+def turning(folder: Path) -> np.ndarray:
     """Noisy phases of a spin about z, as Euler angles in degrees across full turns."""
     noise = SIGMA * np.random.default_rng(5).standard_normal(len(TIMES))
-    phases = SPIN * TIMES + noise + shift
+    phases = SPIN * TIMES + noise
     zero = np.zeros(len(TIMES))
     table(folder / "turn.csv", ["time", "a", "b", "c"], [TIMES, np.rad2deg(phases) % 360, zero, zero])
     return phases
@@ -95,6 +95,30 @@ def test_a_uniform_spin_is_a_straight_line_with_the_covariance_of_one(here: Path
     assert found.experiment.config.fit is None
 
 
+@pytest.mark.slow
+def test_its_cone_in_the_viewer_is_as_wide_as_the_covariance_of_a_straight_line(here: Path) -> None:
+    """Across z, the phase moves the x axis, which is the figure axis; along z nothing does."""
+    pytest.importorskip("rerun")
+    from rigidsim.look.stages.registry import build_picture
+    from rigidsim.workflows.view import runs_of
+
+    turning(here)
+    keys = '[fit]\nparameters = ["initial.attitude[2]", "initial.angular_velocity[2]"]\n'
+    (here / "ball.toml").write_text(f'{BALL}[frame]\nfigure_axis = "x"\n{keys}{TURN}')
+    rigidsim.fit("ball.toml", out="fits")
+    ((name, run),) = runs_of([here / "fits" / "ball"])
+    assert name == "ball"
+    now = np.stack([np.ones(run.dataset.sizes["time"]), run.dataset["time"].values], axis=1)
+    expected = np.sqrt(np.einsum("ti,ij,tj->t", now, SIGMA**2 * np.linalg.inv(LINE.T @ LINE), now))
+    (plot,) = build_picture(run.dataset)[0].plots
+    assert plot.unit == "deg"
+    angles = np.radians(plot.values)
+    np.testing.assert_allclose(angles[:, 0], expected, rtol=1e-5)
+    np.testing.assert_allclose(angles[:, 1], 0.0, atol=1e-8)
+    assert "attitude_error" not in run.dataset.attrs  # the integration's own, which isn't what is meant here
+    assert "converged" in run.dataset.attrs["fit"]
+
+
 def test_a_considered_rate_and_a_prior_enter_as_their_formulas_say(here: Path) -> None:
     turning(here)
     known, prior = 0.02, 0.015
@@ -127,13 +151,13 @@ def test_residuals_of_attitudes_turn_as_the_logarithm_does() -> None:
     np.testing.assert_allclose(inverse_right_jacobian(vectors) @ turn, slopes, atol=2e-9)
 
 
-def seen_free(folder: Path, seed: int = 3, rows: int = 30) -> None:
+def seen_free(folder: Path) -> None:
     """Rates, their kinetic energy and a direction of a free body, with noise of 1e-3."""
-    noise = np.random.default_rng(seed)
-    times = np.sort(noise.uniform(0, 10, rows))
+    noise = np.random.default_rng(3)
+    times = np.sort(noise.uniform(0, 10, 30))
     listed = rigidsim.parse(FREE, overrides=["time.end=", f"time.times={times.tolist()}"])
     made = rigidsim.run(listed.replace({"output.record": ["angular_velocity", "quaternion"]}), out=None)
-    rates = made.dataset["angular_velocity"].values + 1e-3 * noise.standard_normal((rows, 3))
+    rates = made.dataset["angular_velocity"].values + 1e-3 * noise.standard_normal((30, 3))
     table(folder / "rates.csv", ["time", "x", "y", "z"], [times, *rates.T])
     energy = 0.5 * rates**2 @ np.array([1, 2, 2.5])
     table(folder / "energy.csv", ["time", "value"], [times, energy])
@@ -286,3 +310,59 @@ def test_wrong_keys_and_observables_are_refused(here: Path) -> None:
     undated = ONE.replace('epoch = "2016-12-31T23:59:55 UTC"', "")
     with pytest.raises(ConfigError, match="give it one"):
         rigidsim.fit(rigidsim.parse(undated + data("x.csv", "energy", ["x"], 1, 'time = "day"')))
+
+
+# --- what nobody means --------------------------------------------------------------------------------------
+
+SLOW = FREE.replace("[0.3, 1.0, -0.4]", "[0.1, 0.5, 0.2]")
+LAMINA = SLOW.replace("[1, 2, 2.5]", "[1, 2, 3]") + '[fit]\nparameters = ["body.principal_moments[2]"]\n'
+
+
+def seen_lamina(folder: Path) -> None:
+    """Exact rates of a body whose largest moment is 2.5."""
+    found = rigidsim.run(rigidsim.parse(SLOW, overrides=["time.samples=11"]), out=None).dataset
+    table(
+        folder / "rates.csv", ["time", "x", "y", "z"], [found.time.values, *found.angular_velocity.values.T]
+    )
+
+
+def test_what_bars_a_fit_is_told(here: Path) -> None:
+    """Columns that are mixed up ask of a lamina for a largest moment beyond the sum of the others."""
+    seen_lamina(here)
+    found = rigidsim.fit(rigidsim.parse(LAMINA + RATES.replace('"x", "y", "z"', '"y", "x", "z"')))
+    assert not found.converged
+    assert any("refused: principal moments" in text and "I1 + I2 >= I3" in text for text in found.told)
+
+
+def test_observations_that_are_given_twice_are_told(here: Path) -> None:
+    seen_lamina(here)
+    text = LAMINA.replace("2, 3]", "2, 2.4]")
+    once, twice = (rigidsim.fit(rigidsim.parse(text + n * RATES)) for n in (1, 2))
+    assert not once.told
+    assert any("data 1 and 2 have rows" in told and "(11)" in told for told in twice.told)
+
+
+NONE = r"sigma: given .*; a standard deviation above zero|finite"
+MIXED = data("mixed.csv", "angular_velocity", ["a_deg_s", "b_rad_s", "c_rad_s"], 1e-3)
+IMPOSSIBLE = {
+    "no width": (RATES.replace("0.001", "inf"), NONE),
+    "no square": (RATES.replace("0.001", "1e-300"), NONE),
+    "a prior without a width": (
+        'prior."body.principal_moments[2]" = {sigma = 0}\n' + RATES,
+        r'prior\."body\.principal_moments\[2\]": .*above zero',
+    ),
+    "units": (MIXED, r"columns in several units \(deg/s, rad/s\)"),
+}
+
+
+def test_what_no_fit_can_be_made_of_is_refused(here: Path) -> None:
+    seen_lamina(here)
+    (here / "mixed.csv").write_text("time,a_deg_s,b_rad_s,c_rad_s\n1,1,1,1\n2,1,2,1\n")
+    for more, message in IMPOSSIBLE.values():
+        with pytest.raises(ConfigError, match=message) as error:
+            rigidsim.fit(rigidsim.parse(LAMINA + more))
+        assert len(error.value.problems) == 1
+    # rounding would tell moments apart
+    single = LAMINA.replace("[fit]", '[integrator]\nprecision = "single"\n[fit]') + RATES
+    with pytest.raises(ConfigError, match=r"\[integrator\] precision: .*\"double\" is allowed"):
+        rigidsim.fit(rigidsim.parse(single))

@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 from support import config
 
 import rigidsim
-from rigidsim.errors import ConfigError
 from rigidsim.formats.ck_reading import read_rows
 from rigidsim.scene.epochs import parse_epoch
 
@@ -153,27 +152,3 @@ def test_a_fit_to_a_kernel_finds_start_and_moment(here: Path) -> None:
         right = truth.get(one.key, one.start)
         assert abs(one.value - right) < 3 * one.sigma, one.key
     assert found.sigma("initial.attitude[0]") < ATTITUDE
-
-
-def test_a_message_is_turned_from_its_own_axes(here: Path) -> None:
-    """An AEM of a scene in the ecliptic is about the equator; another tool's may go from body to space."""
-    rigidsim.run(rigidsim.parse(TUMBLING), out=here / "runs")
-    [path] = rigidsim.export(here / "runs/tumbling", "aem", here / "seen.aem")
-    text = path.read_text()
-    assert "REF_FRAME_A = EME2000" in text
-    rows = []
-    for row in text.splitlines():
-        words = row.split()
-        if len(words) == 5 and "T" in words[0]:
-            words[4] = f"-{words[4]}".removeprefix("--")  # the conjugate
-        rows.append(" ".join(words))
-    text = "\n".join(rows).replace("REF_FRAME_A = EME2000", "REF_FRAME_A = SC_BODY_1")
-    text = text.replace("REF_FRAME_B = SC_BODY_1", "REF_FRAME_B = EME2000")
-    path.write_text(text)
-    fit = TUMBLING + FIT.replace("seen.bc", "seen.aem").replace('kernels = ["clock.tsc"]', "")
-    found = rigidsim.fit(rigidsim.parse(fit))
-    assert found.data[0].rms < 1e-9
-    assert abs(found.value("initial.attitude[0]")) < 1e-9
-    path.write_text(text.replace("EME2000", "MARS_IAU"))
-    with pytest.raises(ConfigError, match="attitudes and orbits about one of EME2000"):
-        rigidsim.fit(rigidsim.parse(fit))
