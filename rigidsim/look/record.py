@@ -10,7 +10,7 @@
 | ``figure_axis``, ``reference`` | unit vectors, body and space axes; null for what the body or nobody says, and ``"moving"`` for the normal of a plane that moves |
 | ``space_axes`` | name of the space axes |
 | ``gravity`` | of all uniform fields together, m/s^2, space axes, or null |
-| ``objects`` | of loads: ``{"what": "source" or "attractor", "gravitational_parameter"}`` with ``orbit`` (elements at time zero and their rates), ``position``, ``ephemeris`` or ``kernel`` (the name by which its position was recorded); ``{"what": "rotor"}``; ``{"what": "core"}`` |
+| ``objects`` | of loads: ``{"what": "source" or "attractor", "gravitational_parameter"}`` with ``orbit`` (elements at time zero and their rates), ``position``, ``ephemeris`` or ``kernel`` (the name by which its position was recorded); ``{"what": "rotor"}``; ``{"what": "core"}``; ``{"what": "rigid_body", "name", "drawing"}`` |
 
 Datasets of version 1.0.0 have parts of it in several attributes, and in the text of their config.
 """  # noqa: E501
@@ -63,6 +63,7 @@ class RecordedScene:
     sources: Things
     attractors: Things
     rotors: Things
+    partners: Things
     core: bool
 
     @property
@@ -103,7 +104,8 @@ def _read(text: str) -> RecordedScene:
     found = json.loads(text)
     moments = None if found["moments"] is None else np.array(found["moments"], dtype=float)
     objects = found["objects"]
-    kinds = {w: [x for x in objects if x["what"] == w] for w in ("source", "attractor", "rotor", "core")}
+    names = ("source", "attractor", "rotor", "core", "rigid_body")
+    kinds = {w: [x for x in objects if x["what"] == w] for w in names}
     pull = np.array(found["gravity"] or [0.0, 0.0, 0.0], dtype=float)
     inertia = None if found["inertia"] is None else np.array(found["inertia"], dtype=float)
     axes = np.eye(3) if found["axes"] is None else np.array(found["axes"], dtype=float)
@@ -122,6 +124,7 @@ def _read(text: str) -> RecordedScene:
         sources=kinds["source"],
         attractors=kinds["attractor"],
         rotors=kinds["rotor"],
+        partners=kinds["rigid_body"],
         core=bool(kinds["core"]),
     )
     figure = found["figure_axis"]

@@ -14,6 +14,7 @@ from scipy.interpolate import make_interp_spline
 from support import config, loaded, matrices, run_text, same_bits, seeds, wide
 
 import rigidsim
+from rigidsim.look.stages.registry import build_picture
 from rigidsim.solve.problem import prepare
 
 G = 6.6743e-11
@@ -441,3 +442,16 @@ def test_ready_scenes_keep_what_is_conserved(name: str) -> None:
         assert row["largest_drift"] <= row["bound"], one
     kept = {"energy", "angular_momentum"}
     assert kept <= {one for one, row in run.summary["invariants"].items() if not row["numerical"]}
+
+
+def test_the_timeline_shows_both_bodies_at_true_sizes_and_distance() -> None:
+    data = loaded(run_text(didymos(time="end = 4e4\nsamples = 9")))
+    picture, _ = build_picture(data)
+    stage = picture.stages[0]
+    place = data["rigid_body_position"].values[:, 0]
+    assert stage.unit == pytest.approx(np.linalg.norm(place, axis=1).max())
+    assert stage.size * stage.unit == pytest.approx(425)
+    parts = {part.path: part.values for part in stage.parts}
+    far = np.linalg.norm(parts["partner/around/0"], axis=1).max() * stage.unit
+    assert far == pytest.approx(103.16, rel=1e-3)
+    np.testing.assert_allclose(parts["partner_track/recent"] * stage.unit, place, atol=1e-9)

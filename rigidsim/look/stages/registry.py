@@ -13,7 +13,7 @@ import xarray
 from rigidsim.look import signals
 from rigidsim.look.record import body_of, called, color_of, scene_of
 from rigidsim.look.signals import need, optional
-from rigidsim.look.solids import Mesh, ball, globe, graticule, rotation_matrix, spinning_top
+from rigidsim.look.solids import Mesh, ball, body_meshes, globe, graticule, rotation_matrix, spinning_top
 from rigidsim.look.sources import kepler_path, orbit_normal
 from rigidsim.look.stages import bodies, parts, planet
 from rigidsim.look.stages.bodies import (
@@ -51,6 +51,8 @@ _Planet = KnownBody | None
 ENERGY: parts.Color = (120, 150, 200)
 NORMAL: parts.Color = (190, 150, 255)
 FORWARD: parts.Color = (150, 205, 110)
+PARTNER = "partner"
+"""Frame of a second body."""
 IN_BODY_AXES = "no attitude was recorded: the body is shown in its own axes and doesn't turn"
 TRACE = 1.0  # where on a top's axis the traced point is, in reaches
 _SYMMETRIC = 1e-9  # of the moments
@@ -159,6 +161,36 @@ def free_orbit(dataset: xarray.Dataset, subject: Subject) -> Picture:
     close = subject.stage(shown, "Body, seen in space axes")
     stages = [close, _orbit(subject, position, planet, notes)]
     return Picture("orbit about an attracting point", stages, notes)
+
+
+def pair(dataset: xarray.Dataset, subject: Subject) -> Picture:
+    """Picture of two rigid bodies at true sizes and distance, the first at the origin."""
+    listed = scene_of(dataset).partners
+    need(len(listed) == 1 and "rigid_body_position" in dataset)
+    other, name = dataset.isel(rigid_body=0), listed[0]["name"]
+    place, q = (
+        need(signals.values(other, f"rigid_body_{x}", n)) for x, n in (("position", 3), ("quaternion", 4))
+    )
+    unit = float(np.nanmax(np.linalg.norm(place, axis=1)))
+    meshes = body_meshes(listed[0]["drawing"])
+    size = max(mesh.reach() for mesh in meshes) / unit
+    shown = [
+        *parts.frame(PARTNER, quaternion=q, translation=place / unit),
+        *(parts.solid(around(PARTNER, str(k)), mesh.scaled(1 / unit)) for k, mesh in enumerate(meshes)),
+        spot("label", name, parts.PALE, np.array([0.0, 0.0, 1.4 * size]), place=PARTNER),
+    ]
+    elevation, azimuth = plane_view(place)
+    up = np.array([0.0, 0.0, 1.0])
+    camera = Camera(1.25 / np.sin(FIELD / 2) * direction_of(elevation, azimuth), np.zeros(3), up)
+    true, words = subject.reach / unit, f"track of {name}"
+    shown += trail("partner_track", parts.TRACK, place / unit, words)
+    stage = subject.stage(
+        shown, "Both bodies, to scale", size=true, unit=unit, axes=1.3 * true, camera=camera
+    )
+    near, notes = vectors_of(dataset, subject, paths=False)
+    notes.insert(0, f"both bodies have true sizes and distances: 1 unit = {unit:.6g} m, the largest distance")
+    close = subject.stage(near, "First body, seen in space axes", root="close")
+    return Picture("two rigid bodies", [stage, close], notes)
 
 
 def satellite(dataset: xarray.Dataset, subject: Subject) -> Picture:
@@ -406,7 +438,7 @@ def _any(dataset: xarray.Dataset, subject: Subject) -> Picture:
     return Picture("motion of a rigid body", with_track(subject, shown, notes), notes)
 
 
-KINDS = (top, free_orbit, flight, satellite, planet.picture, free, _any)
+KINDS = (pair, top, free_orbit, flight, satellite, planet.picture, free, _any)
 """Functions that make the picture of a scene of their kind; the first that finds what it needs does."""
 
 

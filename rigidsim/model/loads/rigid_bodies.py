@@ -505,6 +505,9 @@ class SecondBody(Load):
         energy = self.reduced_mass * dot(start.velocity, start.velocity) + dot(start.rates, spin)
         return apply(transpose(attitude.rotation_matrix(scene.quaternion)), whole), energy / 2
 
+    def pictured(self) -> dict[str, Any]:
+        return {"what": "rigid_body", "name": self.name, "drawing": self.body.drawing}
+
     # --- from the config ------------------------------------------------------------------------------------
 
     @classmethod
