@@ -63,6 +63,8 @@ SPINNER = config(
     more='[[states]]\nname = "burnt"\nunit = "kg"\nderivative = "0.1*k"\n[parameters]\nk = 1\n'
     '[[rotors]]\nname = "wheel"\naxis = [1, 2, 2]\nmoment = 0.1\nrate = 2\n'
     '[[rotors]]\nname = "motor"\naxis = [0, 1, 0]\nmoment = 0.2\nrate = 1\ntorque = "-0.1*wy"\n'
+    '[[rotors]]\nname = "gyro"\naxis = [0, 0, 1]\nmoment = 0.1\nrate = 2\nfixed = true\n'
+    'gimbal = [1, 1, 0]\ngimbal_angle = 0.3\ngimbal_rate = "0.2*cos(t)"\n'
     '[[events]]\nname = "half"\nexpression = "wx"\n',
 )
 ELASTIC = config(

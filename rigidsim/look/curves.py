@@ -462,7 +462,7 @@ def locked_longitude(dataset: xarray.Dataset) -> Array:
 def _of_rotors(dataset: xarray.Dataset, columns: list[Array]) -> Found:
     """A column for each rotor; what motors do takes the whole run."""
     rotors = gyrostats.rotors(dataset)
-    options = {"labels": [r.name for r in rotors], "begins": all(r.drive != "driven" for r in rotors)}
+    options = {"labels": [r.name for r in rotors], "begins": not any(r.works for r in rotors)}
     need(bool(columns))
     return np.stack(columns, axis=1), options
 
@@ -470,7 +470,7 @@ def _of_rotors(dataset: xarray.Dataset, columns: list[Array]) -> Found:
 def rotor_tilts(dataset: xarray.Dataset) -> Found:
     """Angles of the rotors' axes from the angular momentum."""
     whole, rotors = need(gyrostats.momentum(dataset)), gyrostats.rotors(dataset)
-    return _of_rotors(dataset, [signals.angle_between(whole, rotor.axis) for rotor in rotors])
+    return _of_rotors(dataset, [signals.angle_between(whole, rotor.axes) for rotor in rotors])
 
 
 def rotor_rates(dataset: xarray.Dataset) -> Found:

@@ -26,13 +26,14 @@ _ALIKE = 1e-9  # of the largest, within which moments are equal, and of the mome
 _SAME = 1e-4  # rad, within which two points are one
 _FLAT = 1e-7  # of the largest 1/K, squared, below which curvatures decide no stability
 _STARTS, _STEPS, _FAR = 300, 40, 0.2  # of Newton's method on the sphere; rad, that a step has at most
+_KEPT = ("fixed", "gimballed")
 _MOST = 6  # isolated equilibria of any gyrostat
 
 
 @dataclass(frozen=True)
 class RecordedRotor:
-    """A rotor: unit axis (3,), body axes; moment about it, kg m^2; "free", "driven" or "fixed"; its rate
-    (rows,) relative to the body, rad/s.
+    """A rotor: unit axis at the start (3,), body axes; moment about it, kg m^2; "free", "driven", "fixed" or
+    "gimballed"; its rate (rows,) relative to the body, rad/s; and its axis (rows, 3), if a gimbal turns it.
     """
 
     name: str
@@ -40,6 +41,17 @@ class RecordedRotor:
     moment: float
     drive: str
     rate: Array
+    turned: Array | None = None
+
+    @property
+    def works(self) -> bool:
+        """Whether a motor changes its momentum in the body."""
+        return self.drive in ("driven", "gimballed")
+
+    @property
+    def axes(self) -> Array:
+        """Its unit axis, (3,) or (rows, 3), body axes."""
+        return self.axis if self.turned is None else self.turned
 
     @property
     def varies(self) -> bool:
@@ -49,21 +61,28 @@ class RecordedRotor:
     @property
     def inner(self) -> Array:
         """Its momentum (rows, 3) relative to the body, body axes, kg m^2/s."""
-        return self.moment * self.rate[:, None] * self.axis
+        return self.moment * self.rate[:, None] * self.axes
 
 
 def rotors(dataset: xarray.Dataset) -> list[RecordedRotor]:
     """The rotors of a dataset whose rates were recorded, or are fixed."""
     recorded, listed = signals.values(dataset, "rotor_rate"), scene_of(dataset).rotors
     count = dataset.sizes["time"]
-    rates = {one["name"]: np.full(count, float(one["rate"])) for one in listed if one["drive"] == "fixed"}
+    kept = (one for one in listed if one["drive"] in _KEPT)
+    rates = {one["name"]: np.full(count, float(one["rate"])) for one in kept}
     if recorded is not None:
         rates |= zip(dataset["rotor"].values.tolist(), recorded.T, strict=True)
-    return [
-        RecordedRotor(name, np.array(one["axis"]), float(one["moment"]), one["drive"], rates[name])
-        for one in listed
-        if (name := one["name"]) in rates
-    ]
+    found = []
+    for one in listed:
+        name, axis, turned = one["name"], np.array(one["axis"]), None
+        if one["drive"] == "gimballed":
+            if (angle := signals.values(dataset, f"gimbal_{name}")) is None:
+                continue
+            side = np.cross(one["gimbal"], axis)
+            turned = np.cos(angle)[:, None] * axis + np.sin(angle)[:, None] * side
+        if name in rates:
+            found.append(RecordedRotor(name, axis, float(one["moment"]), one["drive"], rates[name], turned))
+    return found
 
 
 def tensor(dataset: xarray.Dataset) -> Array | None:
@@ -122,7 +141,7 @@ class Gyrostat:
         turning, inner = inertia.copy(), np.zeros(3)
         for rotor in rotors(dataset):
             inner += rotor.inner[row]
-            if rotor.drive != "fixed":
+            if rotor.drive not in _KEPT:
                 turning -= rotor.moment * np.outer(rotor.axis, rotor.axis)
                 inner += rotor.moment * (rotor.axis @ rates[row]) * rotor.axis
         return cls(turning, inner, float(np.linalg.norm(whole[row])))

@@ -55,7 +55,7 @@ class BroughtState:
     unit: str
     initial: str
     derivative: str
-    parameters: Mapping[str, ExactNumber]  # of both
+    parameters: Mapping[str, ExactNumber]  # of both, besides [parameters]
 
 
 class SourceFields(LoadFields):

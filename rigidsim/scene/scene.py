@@ -32,7 +32,7 @@ from rigidsim.scene.expressions.tree import (
 from rigidsim.scene.frame import figure_of, reference_normal
 from rigidsim.scene.kernels.ephemeris import host_of, resolve_ephemeris
 from rigidsim.scene.point_masses import resolve_point_masses
-from rigidsim.scene.registry import LOADS, SceneLoad, Setting
+from rigidsim.scene.registry import LOADS, BroughtState, SceneLoad, Setting
 from rigidsim.scene.sample_times import SampleTimes, sample_times
 from rigidsim.scene.schema import Config
 from rigidsim.scene.swept import plain
@@ -457,11 +457,11 @@ def resolve_states(setting: Setting) -> list[OwnState]:
         rate = None if table.unit is None else "s^-1" if table.unit == "1" else f"{table.unit}/s"
         derivative = here.expression("derivative", table.derivative, rate, read_too=True)
         found.append(OwnState(table.name, table.unit, start.at(setting.context), derivative))
-    for number, load in enumerate(setting.config.loads):
-        here = setting.at("loads", number)
-        for x in load.brought_states():
+    for key, number, x in setting.config.every_state:
+        if isinstance(x, BroughtState):
+            here, known = setting.at(key, number), {**setting.config.parameters, **x.parameters}
             slope, begins = (
-                here.expression("name", text, unit, parameters=x.parameters)
+                here.expression("name", text, unit, parameters=known)
                 for text, unit in ((x.derivative, f"{x.unit}/s"), (x.initial, x.unit))
             )
             found.append(OwnState(x.name, x.unit, setting.context.zero, slope, begins=begins))

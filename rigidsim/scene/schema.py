@@ -68,7 +68,9 @@ from rigidsim.scene.fields import (
     named,
     number_schema,
     one_of,
+    only_with,
     refuse,
+    together,
 )
 from rigidsim.scene.frame import Frame
 from rigidsim.scene.kepler import Ellipse
@@ -236,13 +238,15 @@ class Insolation(ConfigTable):
 
 def _states_of(tables: Mapping[str, Any]) -> Iterator[Any]:
     """Names of the states of a config as it is written, also of states that loads bring."""
-    for key in ("states", "loads"):
+    for key in ("states", "loads", "rotors"):
         listed = tables.get(key)
         for table in listed if isinstance(listed, list) else ():
             if isinstance(table, dict):
                 load = LOADS["kind"].get(str(table.get("kind"))) if key == "loads" else None
                 if key == "states" or (load is not None and load.Fields.brings_state):
                     yield table.get("name")
+                if key == "rotors" and "gimbal" in table:
+                    yield f"gimbal_{table.get('name')}"
 
 
 class Output(ConfigTable):
@@ -608,6 +612,7 @@ class RotorTable(ConfigTable):
     includes it as if it were locked.
     """
 
+    rules = (together("gimbal", "gimbal_rate"), only_with("gimbal", "gimbal_angle"))
     name: VariableName = Field(examples=["wheel"])
     """letters, digits and underscores, beginning with a letter; rate_NAME in expressions is its rate"""
     axis: Direction = Field(examples=[[0, 0, 1]])
@@ -622,6 +627,21 @@ class RotorTable(ConfigTable):
     """
     fixed: StrictBool = False
     """a motor keeps the rate, with any torque needed"""
+    gimbal: Direction | None = Field(None, examples=[[1, 0, 0]])
+    """axis of a gimbal that turns the rotor, body axes, at right angles to its axis: a control moment gyro;
+    needs fixed = true and gimbal_rate
+    """
+    gimbal_rate: Formula | None = Field(None, examples=["0.1*sin(t)"])
+    """rate of the gimbal's angle, rad/s: an expression like torque; gimbal_NAME is the angle"""
+    gimbal_angle: Angle = ZERO
+    """angle of the gimbal at the start; at 0 the rotor's axis is axis"""
+
+    def brought_states(self) -> list[BroughtState]:
+        """The gimbal's angle."""
+        if self.gimbal is None or self.gimbal_rate is None:
+            return []
+        start = {"angle__": self.gimbal_angle}
+        return [BroughtState(f"gimbal_{self.name}", "rad", "angle__", self.gimbal_rate, start)]
 
 
 class RelativeOrbit(Ellipse):
@@ -755,7 +775,11 @@ class Config(ConfigTable):
     def every_state(self) -> list[tuple[str, int, OwnStateTable | BroughtState]]:
         """``[[states]]`` and states that loads bring, each with its array of tables and the place there."""
         found: list[tuple[str, int, Any]] = [("states", i, table) for i, table in enumerate(self.states)]
-        return found + [("loads", i, x) for i, load in enumerate(self.loads) for x in load.brought_states()]
+        bringing: tuple[tuple[str, list[Any]], ...] = (("loads", self.loads), ("rotors", self.rotors))
+        return found + [
+            (key, i, x) for key, tables in bringing for i, table in enumerate(tables)
+            for x in table.brought_states()
+        ]  # fmt: skip
 
     @model_validator(mode="after")
     def _tides_are_of_averages(self) -> Config:
@@ -809,7 +833,9 @@ class Config(ConfigTable):
             if names.count(name) > 1:
                 raise refuse(f'two {info.field_name} are named "{name}"; give each another name')
         for name in (
-            x.name for x in value if info.field_name == "states" or getattr(x, "brings_state", False)
+            x.name
+            for table in value
+            for x in ([table] if info.field_name == "states" else getattr(table, "brought_states", list)())
         ):
             if name in {*OBSERVABLES, *BODY_NAMES, *RESERVED}:
                 raise refuse(f'a state is named "{name}", as a variable that can be recorded; rename it')

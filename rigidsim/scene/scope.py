@@ -141,8 +141,7 @@ NAMED_OTHERWISE = {
         "reaction_wheel", "momentum_wheel", "wheel", "flywheel", "rotor", "gyrostat", "gyroscope",
         "momentum_bias", "dual_spin", "momentum_exchange",
     ),
-    "wheels on gimbals aren't modelled; a wheel on a fixed axis is one of [[rotors]] (docs/rotors.md), and "
-    "the torque of a gimbal is a torque of expressions, with its angle in [[states]] (docs/own_states.md)": (
+    "a wheel on a gimbal is one of [[rotors]] with gimbal and gimbal_rate (docs/rotors.md)": (
         "control_moment_gyro", "control_moment_gyroscope", "cmg", "vscmg", "scmg", "gimballed_wheel",
     ),
     "coils are a magnetic_dipole whose moment is an expression, as in rigidsim new "

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 from equations import CLOSE, Random, derivative, matrix
-from support import config, loaded, matrices, run_text, same_bits
+from scipy.integrate import solve_ivp
+from support import config, loaded, matrices, run_text, same_bits, seeds
 
 import rigidsim
 from rigidsim.solve.problem import prepare
@@ -253,3 +254,43 @@ def test_a_slender_satellite_with_a_damper_ends_in_a_flat_spin_as_explorer_1_did
 def test_nonsense_is_refused(changes: list[str], message: str) -> None:
     with pytest.raises(rigidsim.ConfigError, match=message):
         run_text(scene(FREE, FIXED, end=5), *changes)
+
+
+@pytest.mark.parametrize("seed", seeds(3, 30))
+def test_a_control_moment_gyro_exchanges_momentum_with_the_body(seed: int) -> None:
+    """Against DOP853; the momentum in space stays, and the energy is the work of the gimbal."""
+    rng = np.random.default_rng(seed)
+    axis, other = rng.normal(size=(2, 3))
+    axis, gimbal = axis / np.linalg.norm(axis), np.cross(axis, other)
+    start, rate, w = rng.uniform(-3, 3), rng.uniform(5, 20), rng.normal(size=3) * 0.3
+    text = config(
+        f"principal_moments = {MOMENTS}", f"angular_velocity = {w.tolist()}", time="end = 10\nsamples = 11",
+        more=f'[[rotors]]\nname = "g"\naxis = {(3 * axis).tolist()}\nmoment = 0.1\nrate = {rate}\n'
+        f"fixed = true\ngimbal = {gimbal.tolist()}\ngimbal_angle = {start}\n"
+        'gimbal_rate = "0.2*sin(t) - wy*cos(gimbal_g)"\n',
+    )  # fmt: skip
+    run = run_text(text)
+    assert_kept(run, {"angular_momentum", "angular_momentum_norm", "energy_balance"})
+    gimbal /= np.linalg.norm(gimbal)
+
+    def slope(t: float, y: np.ndarray) -> np.ndarray:
+        turned, moving = y[3], 0.2 * np.sin(t) - y[1] * np.cos(y[3])
+        along = np.cos(turned) * axis + np.sin(turned) * np.cross(gimbal, axis)
+        torque = np.cross(MOMENTS * y[:3] + 0.1 * rate * along, y[:3])
+        return np.append((torque - 0.1 * rate * moving * np.cross(gimbal, along)) / MOMENTS, moving)
+
+    data = loaded(run)
+    known = solve_ivp(slope, [0, 10], [*w, start], "DOP853", data.time.values, rtol=1e-12, atol=1e-13).y
+    np.testing.assert_allclose(data.angular_velocity.values.T, known[:3], rtol=0, atol=1e-10)
+    np.testing.assert_allclose(data.gimbal_g.values, known[3], rtol=0, atol=1e-10)
+
+
+def test_a_gimbal_that_is_none_is_refused() -> None:
+    wheel = '[[rotors]]\nname = "g"\naxis = [0, 0, 1]\nmoment = 0.1\nrate = 9\ngimbal_rate = "1"\n'
+    for more, said in (
+        ("gimbal = [1, 0, 0]", "fixed: missing; a rotor on a gimbal needs fixed = true"),
+        ("fixed = true\ngimbal = [1, 0, 1]", "whose cosine with the rotor's is 0.707; 0 is allowed"),
+        ("fixed = true", "missing gimbal"),
+    ):
+        with pytest.raises(rigidsim.ConfigError, match=said):
+            run_text(config(more=wheel + more + "\n"))

@@ -294,7 +294,7 @@ def sphere(dataset: xarray.Dataset, row: int) -> Draw:
     """Levels of the energy at the first row, or at the last if motors have changed them, separatrices,
     equilibria, and the path of the run, its start and positive axes on the side that is seen.
     """
-    driven = any(rotor.drive == "driven" for rotor in gyrostats.rotors(dataset))
+    driven = any(rotor.works for rotor in gyrostats.rotors(dataset))
     need(row == 0 or driven)
     whole, gyrostat = need(gyrostats.path(dataset)), need(Gyrostat.of(dataset, row))
     title = "Momentum sphere in body axes: levels of energy"

@@ -16,6 +16,11 @@ and is a constant of a free rotor. In terms of h and I_b = I - sum of J a a^T ov
 the rotor's, and only the rest, -torque a . w, has to be integrated. One that keeps a rate does the work
 J s a . (w - w0): what stays then is w . I w / 2 of the body with that rotor locked.
 
+The axis of a rotor on a driven gimbal turns about the gimbal g by the angle d, a state: the momentum
+J s (cos d a + sin d g x a) of a kept rate exerts -J s d' g x a(d) on the body (Schaub & Junkins, Analytical
+Mechanics of Space Systems, 2018, section 4.5, without the gimbal's own inertia), and its power is that
+torque's on the body.
+
 **A fluid core** turns apart, by friction and by the pressure of a flattened boundary. Its axis p is the
 body's axis of largest moment, its tensor I_c = A_c + (C_c - A_c) p p^T stays in body axes, and with its rate
 v and the body's w, both in body axes,
@@ -58,6 +63,8 @@ from rigidsim.scene.registry import EffectPart, Setting, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config, RotorTable
 from rigidsim.scene.swept import plain
+
+_ACROSS = 1e-12  # cosine of a right angle, but for rounding
 
 
 @register_load(table="rotors")
@@ -113,8 +120,8 @@ class Rotor(Load):
         motor = None if fields.torque is None else around.expression("torque", fields.torque, "N m")
         size = norm(context, axis)
         axis = [x / size if x != 0 else context.zero for x in axis]
-        numbers = moment, fields.rate.at(context)
-        return cls(fields.name, axis, *numbers, motor, fields.fixed)
+        rotor = cls(fields.name, axis, moment, fields.rate.at(context), motor, fields.fixed)
+        return rotor if fields.gimbal is None else GimballedRotor.on(rotor, fields, around)
 
     @property
     def title(self) -> str:  # type: ignore[override]
@@ -258,6 +265,90 @@ class Rotor(Load):
             "rate": float(plain(self.rate)),
             "drive": "fixed" if self.fixed else "free" if self.motor is None else "driven",
         }
+
+
+@dataclass(frozen=True)
+class GimballedRotor(Rotor):
+    """A rotor at a fixed rate on a gimbal: a control moment gyro.
+
+    Attributes:
+        gimbal: unit axis of the gimbal, body axes, at right angles to the rotor's axis (mpf).
+        gimbal_rate: of its angle, rad/s.
+        start: the angle at the start (mpf).
+    """
+
+    gimbal: Vector
+    gimbal_rate: Expression
+    start: Any
+
+    @classmethod
+    def on(cls, rotor: Rotor, fields: RotorTable, around: Setting) -> GimballedRotor:
+        """A rotor on the gimbal that the keys describe."""
+        gimbal = [x.at(around.context) for x in required(fields.gimbal)]
+        size = norm(around.context, gimbal)
+        across = dot(gimbal, rotor.axis) / size
+        what = f"given an axis whose cosine with the rotor's is {float(plain(across)):.3g}; 0 is allowed"
+        ensure(abs(across) < _ACROSS, around.fault("gimbal", what))
+        what = "missing; a rotor on a gimbal needs fixed = true, by which its motor keeps its rate"
+        ensure(fields.fixed, around.fault("fixed", what))
+        rate = around.expression("gimbal_rate", required(fields.gimbal_rate), "rad/s")
+        start = fields.gimbal_angle.at(around.context)
+        unit = [x / size for x in gimbal]
+        return cls(**vars(rotor), gimbal=unit, gimbal_rate=rate, start=start)
+
+    @property
+    def reads(self) -> frozenset[str]:  # type: ignore[override]
+        return states_read(self.gimbal_rate) | {f"gimbal_{self.name}"}
+
+    def _turned(self, ahead: bool) -> list[tuple[Vector, int]]:
+        """Axes of the angle's cosine and sine in the momentum, or in its derivative by the angle."""
+        side = cross(self.gimbal, self.axis)
+        return [(side, 0), ([-x for x in self.axis], 1)] if ahead else [(self.axis, 0), (side, 1)]
+
+    def _terms(self, m: Kinematics, exponent: int, *, ahead: bool = False) -> list[Term]:
+        state = f"gimbal_{self.name}"
+        angle = in_si(m, hy.make_vars(state), m.scaling.own.get(state, 0))
+        size = m.scene.context.ldexp(self.moment * self.rate, exponent)
+        parts = hy.cos(angle), hy.sin(angle)
+        return [([size * x for x in axis], parts[which]) for axis, which in self._turned(ahead)]
+
+    def carried_momentum(self, m: Kinematics) -> list[Term]:
+        return self._terms(m, -m.scaling.momentum)
+
+    def lends(self, m: Kinematics) -> bool:
+        return False
+
+    def carried_energy(self, m: Kinematics) -> Symbolic | None:
+        """None: the rotor's own is a constant."""
+        return None
+
+    def exerted_torque(self, m: Kinematics) -> list[Term]:
+        (rate,) = written(m, [self.gimbal_rate])
+        return [
+            ([-x for x in vector], rate * part)
+            for vector, part in self._terms(m, -m.scaling.energy, ahead=True)
+        ]
+
+    def supplied_power(self, m: Kinematics) -> Symbolic | None:
+        parts = [
+            m.number(x) * (part * w) for vector, part in self.exerted_torque(m)
+            for x, w in zip(vector, m.rates, strict=True) if x != 0
+        ]  # fmt: skip
+        return hy.sum(parts)
+
+    def carried_at_start(self, scene: Scene) -> tuple[Vector, Any]:
+        context = scene.context
+        parts, size = (context.cos(self.start), context.sin(self.start)), self.moment * self.rate
+        found = [[size * parts[which] * x for x in axis] for axis, which in self._turned(False)]
+        return [x + y for x, y in zip(*found, strict=True)], context.zero
+
+    def amplitude(self, scene: Scene) -> Any | None:
+        """None: its effect is estimated."""
+        return None
+
+    def pictured(self) -> dict[str, Any]:
+        gimbal = [float(plain(x)) for x in self.gimbal]
+        return super().pictured() | {"drive": "gimballed", "gimbal": gimbal}
 
 
 @provides
