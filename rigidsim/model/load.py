@@ -197,6 +197,10 @@ class Load(SceneLoad):
         """
         return []
 
+    def contacts(self, m: Kinematics) -> list[tuple[str, Symbolic]]:
+        """Quantities of order one whose passing below zero means that bodies touch, each with the reason."""
+        return []
+
     # --- its size, from which units and drift scales are chosen ---------------------------------------------
 
     def amplitude(self, scene: Scene) -> Any | None:

@@ -43,8 +43,8 @@ _VALUES: dict[str, Callable[[Scaling], int]] = {
     "supplied_power": lambda units: units.energy - units.time,
     "motion": lambda units: units.speed,
     **dict.fromkeys(
-        ("narrow", "roots", "endings", "range_ends", "source_direction", "flux_density", "keeps_axial",
-         "lends"),
+        ("narrow", "roots", "endings", "range_ends", "contacts", "source_direction", "flux_density",
+         "keeps_axial", "lends"),
         lambda _: 0,
     ),
 }  # fmt: skip

@@ -21,6 +21,7 @@ import rigidsim.model.observables.mechanical  # noqa: F401  (enters what it defi
 from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.kinematics import Poles
+from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.names import above_zero, carries_sign, plain_angles, written
 from rigidsim.model.observables.mechanical import WATCHED, WORK
@@ -166,6 +167,13 @@ def drift_outputs(invariants: list[Invariant], context: Any, number: Rounder) ->
 
 
 _LARGEST_EXPONENT = 1000  # of a recorded variable in SI: float64 ends at 2^1024, and sizes are known roughly
+IMPOSSIBLE = "impossible body"
+ENDINGS: dict[str, Callable[[Load, Mechanics], list[tuple[str, Symbolic]]]] = {
+    IMPOSSIBLE: lambda load, m: load.endings(m),
+    "out of range": lambda load, m: load.range_ends(m),
+    "contact": lambda load, m: load.contacts(m),
+}
+"""What ends a motion, by the words of the status."""
 _DIRECTIONS = {"any": 0, "up": 1, "down": -1}
 
 
@@ -178,7 +186,7 @@ class Crossing:
     direction: int  # -1, 0 (any) or 1
     stop: bool
     impossible: str = ""  # why the motion can't go on past it; empty for events of the config
-    leaves_range: bool = False  # whether that is because the range of a model ends there
+    kind: str = ""  # of that ending, as its status names it
 
 
 class System:
@@ -380,15 +388,14 @@ class System:
             (expression,) = written(m, [event.expression], clocked=False)
             direction = self.scaling.direction * _DIRECTIONS[event.direction]
             found.append(Crossing(event.name, expression, direction, event.stop))
-        endings = [(*one, False) for load in m.loads for one in load.endings(m)]
+        endings = [(*one, kind) for kind in ENDINGS for load in m.loads for one in ENDINGS[kind](load, m)]
         endings += [
-            (f"{expression.where} is negative", above_zero(m, expression), False)
+            (f"{expression.where} is negative", above_zero(m, expression), IMPOSSIBLE)
             for expression in self.scene.never_negative()
             if bounds(expression)[0] < 0
         ]
-        endings += [(*one, True) for load in m.loads for one in load.range_ends(m)]
         down = _DIRECTIONS["down"]
-        found += [Crossing("", x, down, True, why, leaves_range) for why, x, leaves_range in endings]
+        found += [Crossing("", x, down, True, why, kind) for why, x, kind in endings]
         meant = self._in_internal_time([one.expression for one in found])
         return [replace(one, expression=x) for one, x in zip(found, meant, strict=True)]
 

@@ -35,6 +35,7 @@ class WarningCode(StrEnum):
     FRICTION_STIFF = "friction_stiff"
     STRENGTH_CONTRADICTS = "strength_contradicts"
     HOST_WITHOUT_GRAVITY = "host_without_gravity"
+    SERIES_DIVERGES = "series_diverges"
 
 
 @dataclass(frozen=True)

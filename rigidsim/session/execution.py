@@ -42,7 +42,7 @@ from rigidsim.solve.lyapunov import LyapunovSpectrum
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.projection import LATE
 from rigidsim.solve.sampler import Progress
-from rigidsim.solve.status import Status
+from rigidsim.solve.status import ENDED, Status
 from rigidsim.solve.stepper import OwnErrors
 from rigidsim.store import provenance
 from rigidsim.store.folder import RunFolder
@@ -373,7 +373,7 @@ def time_reached(prepared: InitialValueProblem, progress: Progress, log: EventLo
     sample.
     """
     clock = prepared.clock
-    if progress.status in (Status.EVENT, Status.IMPOSSIBLE, Status.OUT_OF_RANGE) and log.stop is not None:
+    if progress.status in (Status.EVENT, *ENDED) and log.stop is not None:
         return clock.seconds(log.stop)
     done = progress.next_sample
     return float(clock.labels(done - 1, done)[0]) if done else clock.seconds(clock.start)
@@ -388,7 +388,7 @@ def status_message(prepared: InitialValueProblem, progress: Progress, parts: Ass
         assert ending is not None
         name, when = prepared.system.crossings[ending.index].name, prepared.clock.seconds(ending.time)
         return f"{text}: {name} at {words.moment(when)}"
-    if progress.status in (Status.IMPOSSIBLE, Status.OUT_OF_RANGE) and log.stop is not None:
+    if progress.status in ENDED and log.stop is not None:
         return f"{text}: {log.why_impossible} at {words.moment(prepared.clock.seconds(log.stop))}"
     if progress.status is Status.UNRESOLVED:
         return f"{text}: {progress.detail} (at {words.moment(progress.time)}, after {progress.steps} steps)"

@@ -42,6 +42,7 @@ LEAST: dict[str, Soundness] = {
     WarningCode.NOT_JOINED: Soundness.LIMITED,
     WarningCode.UNDEFINED: Soundness.LIMITED,
     WarningCode.DELAY_TOO_LONG: Soundness.LIMITED,
+    WarningCode.SERIES_DIVERGES: Soundness.LIMITED,
     # of what the config asks for, and of the files: they leave the numbers what they are
     WarningCode.NO_EFFECT: Soundness.SOUND,
     WarningCode.SET_ASIDE: Soundness.SOUND,

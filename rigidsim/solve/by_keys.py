@@ -75,7 +75,7 @@ def refuse_without_derivatives(scene: Scene, system: System, *, has_steps: bool,
             "the load with products of quaternion components"
         )
     elif len(system.crossings) > len(system.events):
-        why = "the body changes in a way that may end its motion, where variational equations end"
+        why = "the motion may end (a body changes, or touches another one), where variational equations end"
     elif scene.found_start is not None:
         why = "the start is an equilibrium that is found, not given; give its attitude and rates instead"
     if why:

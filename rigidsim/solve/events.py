@@ -86,7 +86,7 @@ class EventLog:
         ending = self.ending
         if ending is None or not self.why_impossible:
             return Status.EVENT
-        return Status.OUT_OF_RANGE if self.crossings[ending.index].leaves_range else Status.IMPOSSIBLE
+        return Status(f"stopped: {self.crossings[ending.index].kind}")
 
     def occurrences(self, index: int, last: float) -> list[FoundEvent]:
         """The crossings of one event up to a time, internal units."""

@@ -18,6 +18,7 @@ class Status(Enum):
     UNRESOLVED = "stopped: switching unresolved"
     IMPOSSIBLE = "stopped: impossible body"
     OUT_OF_RANGE = "stopped: out of range"
+    CONTACT = "stopped: contact"
 
     @property
     def message(self) -> str:
@@ -37,7 +38,9 @@ class Status(Enum):
         return self in (Status.FINISHED, Status.EVENT, *_BROKEN)
 
 
-_BROKEN = (Status.NON_FINITE, Status.COLLAPSED, Status.UNRESOLVED, Status.IMPOSSIBLE, Status.OUT_OF_RANGE)
+ENDED = (Status.IMPOSSIBLE, Status.OUT_OF_RANGE, Status.CONTACT)
+"""Where the motion came to something that no body can pass."""
+_BROKEN = (Status.NON_FINITE, Status.COLLAPSED, Status.UNRESOLVED, *ENDED)
 _MESSAGES = {
     Status.RUNNING: "the run is under way, or was killed",
     Status.FINISHED: "the run reached its last sample",
@@ -50,5 +53,6 @@ _MESSAGES = {
     Status.COLLAPSED: "the steps became too small to ever arrive; the samples so far are kept",
     Status.UNRESOLVED: "the motion can't be continued past a switching surface; the samples so far are kept",
     Status.IMPOSSIBLE: "the values became impossible for a body; the samples so far are kept",
+    Status.CONTACT: "two bodies touch; the samples so far are kept",
     Status.OUT_OF_RANGE: "the motion left the range in which a model is known; the samples so far are kept",
 }

@@ -455,3 +455,23 @@ def test_the_timeline_shows_both_bodies_at_true_sizes_and_distance() -> None:
     far = np.linalg.norm(parts["partner/around/0"], axis=1).max() * stage.unit
     assert far == pytest.approx(103.16, rel=1e-3)
     np.testing.assert_allclose(parts["partner_track/recent"] * stage.unit, place, atol=1e-9)
+
+
+# --- contact ------------------------------------------------------------------------------------------------
+
+
+def test_two_spheres_that_fall_together_touch_when_kepler_says() -> None:
+    """From rest at r, s is reached after sqrt(r^3 / 2 G M) (sqrt(x (1 - x)) + acos sqrt(x)), x = s / r."""
+    one, other = (f'shape = "sphere"\nmass = {m * MASS!r}\nradius = {r}' for m, r in ((1, 0.7), (0.2, 0.3)))
+    run = run_text(scene(one, other, 2, [3, 0, 0], time="end = 100\nsamples = 11"))
+    x = 1 / 3
+    expected = math.sqrt(27 / (2 * 1.2)) * (math.sqrt(x * (1 - x)) + math.acos(math.sqrt(x)))
+    assert run.status == "stopped: contact"
+    assert run.summary["time_reached"] == pytest.approx(expected, rel=1e-13)
+    assert "series_diverges" in run.summary["warning_codes"]
+
+
+def test_bodies_within_each_other_are_refused() -> None:
+    text = didymos(DIMORPHOS.replace("1190", "370") + "angular_velocity = [0, 0, 0]")
+    with pytest.raises(rigidsim.ConfigError, match="places the bodies into each other"):
+        prepare(rigidsim.parse(text))

@@ -37,7 +37,7 @@ force follows from the torques and from the terms U_l of total degree l, which f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -57,13 +57,19 @@ from rigidsim.scene.arithmetic import Matrix, Vector, apply, cross, dot, negligi
 from rigidsim.scene.arithmetic import vector as numbers
 from rigidsim.scene.bodies.body import Body, Matter, RigidBody, inverse_inertia
 from rigidsim.scene.bodies.gravity_field import LEAST
+from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, kepler_reach, start_of_elements
+from rigidsim.scene.readable import length_text
 from rigidsim.scene.registry import LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene, whole_body
 from rigidsim.scene.schema import RigidBodyTable
+from rigidsim.scene.swept import plain
 
 _TABLE = "rigid_bodies"
+_WATCHED = 1.5
+"""Sums of the longest half axes within which bodies have to come, as points, for contact to be watched."""
+_THIN = 1e-3  # of the longest half axis, least of the others
 _BOTH_FIGURES = 4
 """Total degree from which on both figures meet in one term."""
 
@@ -412,6 +418,36 @@ class SecondBody(Load):
         spread = scene.context.maximum(moments) - scene.context.minimum(moments)
         return 3 * self.pair.constant * self.body.mass * spread / (2 * least**3)
 
+    @cached_property
+    def semi_axes(self) -> list[Vector]:
+        """Of the homogeneous ellipsoids with the moments of A and of B, along their principal axes, m."""
+        found = []
+        for body in (self.first, self.body):
+            half, mass = sum(body.principal_moments) / 2, required(body.mass)
+            squares = [5 * (half - x) / mass for x in body.principal_moments]
+            thin = max(squares) * _THIN**2  # a rod's
+            found.append([(x if x > thin else thin) ** 0.5 for x in squares])
+        return found
+
+    def contacts(self, m: Kinematics) -> list[tuple[str, Symbolic]]:
+        """The distance over what both ellipsoids reach along the line between the centres, less one; nothing
+        where they don't come near.
+        """
+        seen, (least, _) = self.seen(m), self.reach(m.scene)
+        attracting = seen.attracting
+        if attracting is None or least > _WATCHED * sum(max(axes) for axes in self.semi_axes):
+            return []
+        reached = []
+        for body, axes, line in zip((self.first, self.body), self.semi_axes, attracting.seen, strict=True):
+            squares = []
+            for axis, a in zip(body.principal_axes, axes, strict=True):
+                inverse = attracting.length / a
+                along = hy.sum([m.number(inverse * x) * p for x, p in zip(axis, line, strict=True) if x != 0])
+                squares.append(along * along)
+            reached.append(1.0 / hy.sqrt(hy.sum(squares)))
+        gap = 1.0 / (attracting.inverse * hy.sum(reached)) - 1.0
+        return [(f"the ellipsoids with the moments of [body] and {self.name} touch", gap)]
+
     # --- its states -----------------------------------------------------------------------------------------
 
     def seen(self, m: Kinematics) -> SecondStates:
@@ -533,7 +569,11 @@ class SecondBody(Load):
                     )
                 figures.append(figure)
             pair = Pair((figures[0], figures[1]), degree, context)
-        return cls(fields.name, body, around.body, pair, _started(fields, around, pair), around.where(""))
+        made = cls(fields.name, body, around.body, pair, _started(fields, around, pair), around.where(""))
+        near = sum(min(axes) for axes in made.semi_axes)
+        what = f"places the bodies into each other, {context.nstr(near, 6)} m and more apart are allowed"
+        ensure(norm(context, made.start.position) > near, around.fault("position", what))
+        return made
 
 
 _NO_MASS = "missing; two bodies need theirs, since each moves as the other one is heavy"
@@ -650,3 +690,14 @@ class MutualGravity(Load):
 
     def amplitude(self, scene: Scene) -> Any:
         return scene.context.zero
+
+    def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
+        second = required(second_body(scene))
+        (least, _), reach = second.reach(scene), sum(max(axes) for axes in second.semi_axes)
+        if plain(least) < plain(reach):
+            near, far = (length_text(float(plain(x))) for x in (least, reach))
+            text = (
+                f"the bodies come to about {near} from each other, less than the sum of their longest half "
+            )
+            text += f"axes, {far}, where the series of the mutual gravity may diverge; let them stay apart"
+            yield Caution(WarningCode.SERIES_DIVERGES, f"{where} degree: {text}")

@@ -267,6 +267,7 @@ OUTCOMES = (
     *(s.value for s in (Status.FINISHED, Status.EVENT, Status.WALL_TIME, Status.MAX_STEPS, Status.MAX_DRIFT)),
     *(s.value for s in (Status.NON_FINITE, Status.COLLAPSED, Status.UNRESOLVED, *Outcome, Status.IMPOSSIBLE)),
     Status.OUT_OF_RANGE.value,
+    Status.CONTACT.value,
 )
 """All outcomes of members; a dataset stores the index in this list, which may only grow."""
 WARNINGS = tuple(code.value for code in WarningCode)
