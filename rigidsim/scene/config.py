@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from dataclasses import replace as exchanged
@@ -346,6 +347,9 @@ def _table_sections(config: Config, folder: Path) -> str:
     return "".join(found.values())
 
 
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
+
+
 def _text(where: str, name: str, path: Path, read: Callable[[TextIO], str]) -> str:
     """What is read of a file."""
 
@@ -367,7 +371,7 @@ def _text(where: str, name: str, path: Path, read: Callable[[TextIO], str]) -> s
     what = f", which has more than {_LARGEST_TABLE} characters; keep the rows and digits that the run needs"
     ensure(len(text) <= _LARGEST_TABLE, fault(what))
     text = text.replace("\r\n", "\n").replace("\r", "\n")
-    odd = "'''" in text or any((ord(c) < 32 and c not in "\n\t") or ord(c) == 127 for c in text)
+    odd = "'''" in text or _CONTROL.search(text) is not None
     ensure(not odd, fault(", which holds characters that no table has; save it as plain text"))
     return text
 

@@ -2,6 +2,7 @@
 tables and in place in its text (``--set KEY=VALUE``), and written of Python values, for configs in code.
 """
 
+import copy
 import numbers
 import re
 import tomllib
@@ -9,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from datetime import date, time
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 import tomlkit
@@ -47,6 +49,12 @@ def _refuse_fine_dates(text: str) -> None:
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
     """The tables of a TOML text, decimals kept as written."""
+    return copy.deepcopy(_parsed(text, source))
+
+
+@lru_cache(4)
+def _parsed(text: str, source: str) -> dict[str, Any]:
+    """The tables, read once for all members of a sweep: a table of an orbit may have megabytes."""
     hindrances = (
         (_DEEP_KEY, f"a key of more than {_DEEPEST_KEY} parts (at line {{}})"),
         # of an argument or a file name that isn't UTF-8

@@ -4,22 +4,30 @@ A lane's bits depend neither on its neighbours nor on its place, but on the numb
 recorded. If a state is no longer finite, heyoka stops all lanes at once: each is repeated by itself.
 """
 
+import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import islice
 from typing import Any
 
 import heyoka as hy
 import numpy as np
 
+from rigidsim.errors import required
 from rigidsim.solve.compiled import Kept
 from rigidsim.solve.events import DIRECTIONS
-from rigidsim.solve.requirements import Requirement
+from rigidsim.solve.requirements import Requirement, SetAtKnots
 from rigidsim.solve.stepper import bound_of_sparse_series, longest_step
 
 _GRID = 1 << 16
 """Samples at once; the step before the last of them is shortened, always at the same places."""
+_AT_ONCE = 128  # pieces passed in one call, or one by one after some lane needed more steps than one
 _ARRIVED, _LOST = hy.taylor_outcome.time_limit, hy.taylor_outcome.err_nf_state
+
+LANES_OF_A_TABLE = 16
+"""Lanes of members that pass the rows of a table together: what each row sets takes as long as some ten."""
 
 _Motions = tuple[np.ndarray, ...]
 """Of motions to be integrated: initial and parameters (.., n), start (n,), times (samples, n), and bounds of
@@ -72,7 +80,8 @@ def _grouped(values: np.ndarray, width: int) -> np.ndarray:
 
 class BatchEngine:
     """A compiled batch integrator of ``width`` lanes, of equations and events (with directions) over heyoka's
-    variables and ``par``, the parameters of both; ``requirement`` is what they need before steps.
+    variables and ``par``, the parameters of both; ``requirement`` is what they need before steps. ``knots``
+    are set for all lanes, of motions that start together; their parameters come first.
     """
 
     def __init__(
@@ -85,8 +94,10 @@ class BatchEngine:
         compact: bool = False,
         optimised: bool = True,
         requirement: Requirement | None = None,
+        knots: SetAtKnots | None = None,
     ) -> None:
         self.width, self._requirement = width, requirement or Requirement()
+        self._knots, self._first = knots, 0 if knots is None else knots.parameters
         # recorded quantities may read more parameters than equations and events
         read = [right for _, right in equations] + [expression for expression, _ in events]
         self._used = max((int(str(p).removeprefix("p")) + 1 for p in hy.get_params(read)), default=0)
@@ -183,7 +194,8 @@ class BatchEngine:
             self._requirement.meet(integrator)
             options = {"max_delta_t": bounds[group], "callback": list(self._requirement.each) or None}
             integrator.propagate_until(ends[group], max_steps=most_steps, **options)
-            there[group], then[group] = integrator.state, integrator.time
+            # a step's length is rounded, but none goes beyond its end
+            there[group], then[group] = integrator.state, np.minimum(integrator.time, ends[group])
             steps[group] = [outcome[3] for outcome in integrator.propagate_res]
         found, times = np.concatenate(list(there), axis=1)[:, :count], then.ravel()[:count]
         taken = steps.ravel()[:count]
@@ -200,7 +212,19 @@ class BatchEngine:
         self._integrator.set_time(begin)
         self._integrator.state[:] = states
         if self._used:
-            self._integrator.pars[:] = parameters[: self._used]
+            self._integrator.pars[self._first :] = parameters[: self._used - self._first]
+        if self._knots is not None:
+            pieces = self._knots.pieces
+            number = pieces.number_at(begin[0])
+            begins = number > 0 and pieces.knots[number - 1] == begin[0]
+            self._enter(pieces.parameters(number), pieces.changes(number) if begins else [])
+
+    def _enter(self, parameters: np.ndarray, changes: list[tuple[int, np.ndarray]]) -> None:
+        """Go on in a piece of the equations, with changes where it begins."""
+        engine, knots = self._integrator, required(self._knots)
+        for series, values in changes:
+            engine.state[knots.places[series]] = values[:, None]
+        engine.pars[: self._first] = parameters[:, None]
 
     def _together(self, result: LaneResults, members: list[int], motions: _Motions, most_steps: int) -> bool:
         """Run one group; returns whether a state was lost."""
@@ -220,15 +244,19 @@ class BatchEngine:
             part = times[first : first + _GRID]
             grid, found = part if (part[0] == begin).all() else np.vstack([begin, part]), initial[None]
             if len(grid) > 1:
-                options = {"max_steps": most_steps - int(taken.max()), "max_delta_t": longest}
-                if ends:
-                    integrator.propagate_until(grid[-1], **options)
-                    found = np.stack([initial, integrator.state])
+                most = most_steps - int(taken.max())
+                if self._knots is not None:
+                    found, codes, steps = self._through(grid, longest, most)
                 else:
-                    _, found = integrator.propagate_grid(grid, **options)
-                outcomes = integrator.propagate_res[:count]
-                taken += [now[3] for now in outcomes]
-                whole, lost = (np.array([now[0] == code for now in outcomes]) for code in (_ARRIVED, _LOST))
+                    options = {"max_steps": most, "max_delta_t": longest}
+                    if ends:
+                        integrator.propagate_until(grid[-1], **options)
+                        found = np.stack([initial, integrator.state])
+                    else:
+                        _, found = integrator.propagate_grid(grid, **options)
+                    codes, _, _, steps = map(list, zip(*integrator.propagate_res, strict=True))
+                taken += np.array(steps[:count])
+                whole, lost = (np.array([now == code for now in codes[:count]]) for code in (_ARRIVED, _LOST))
             result.states[first : first + len(part), :, members] = found[-len(part) :, :, :count]
             first, begin = first + len(part), part[-1]
         result.states[first:, :, members] = np.nan
@@ -239,3 +267,82 @@ class BatchEngine:
         for place, member in enumerate(members):
             result.found[member] = [crossing for crossing in self._log if crossing.lane == place]
         return bool(lost.any())
+
+    def _through(
+        self, grid: np.ndarray, longest: np.ndarray, most: int
+    ) -> tuple[np.ndarray, list[Any], list[int]]:
+        """As ``propagate_grid`` does, through pieces of the equations, one by one or, while each takes every
+        lane a single step, many in a call. Returns states at the grid's times, outcomes, and steps.
+        """
+        engine, pieces, times = self._integrator, required(self._knots).pieces, grid[:, 0].tolist()
+        found, taken = np.full((len(grid), *engine.state.shape), np.nan), np.zeros(self.width, dtype=np.int64)
+        found[0], done, now, codes = engine.state, 1, times[0], [_ARRIVED] * self.width
+        number, single, slowly = pieces.number_at(now), False, 0
+        while done < len(times):
+            if taken.max() >= most:
+                codes = [hy.taylor_outcome.step_limit] * self.width
+                break
+            slowly -= 1
+            if single and slowly < 0:
+                done, passed = self._singly(number, found, times, done, longest, most - int(taken.max()))
+                number, taken, slowly = number + passed, taken + passed, 0 if passed else _AT_ONCE
+                if passed:
+                    now = pieces.knots[number - 1]
+                    continue
+            end = pieces.knots[number] if number < len(pieces.knots) else math.inf
+            within = times[done : bisect_right(times, end)]
+            stops = [now, *within, *([end] if end < times[-1] and end not in within[-1:] else [])]
+            rows = np.repeat(np.array(stops)[:, None], self.width, axis=1)
+            options = {"max_steps": most - int(taken.max()), "max_delta_t": longest}
+            states = engine.propagate_grid(rows, **options)[1]
+            codes, _, _, steps = map(list, zip(*engine.propagate_res, strict=True))
+            found[done : done + len(within)], taken = states[1 : 1 + len(within)], taken + steps
+            if any(code != _ARRIVED for code in codes):
+                break
+            now, done, single = stops[-1], done + len(within), max(steps) == 1
+            if now == end:
+                number += 1
+                engine.set_time(rows[-1])
+                self._enter(pieces.parameters(number), pieces.changes(number))
+            else:
+                single = False
+        return found, codes, taken.tolist()
+
+    def _singly(
+        self, number: int, found: np.ndarray, times: list[float], done: int, longest: np.ndarray, most: int
+    ) -> tuple[int, int]:
+        """Pass pieces of equal lengths from one on that all lanes begin, each in one step; none if a lane
+        needs more. Returns how many times of the grid are ``done``, and the pieces passed.
+        """
+        engine, knots, begun = self._integrator, required(self._knots), done
+        places, last = knots.pieces.knots, knots.last_alike(number, min(most, _AT_ONCE) - 1)
+        while last >= number and places[last] >= times[-1]:
+            last -= 1
+        count = last - number + 1
+        if count < 1:
+            return done, 0
+        before, coming = engine.state.copy(), islice(knots.pieces.following(number + 1), count)
+        read = engine.pars[: self._first], engine.state
+
+        def next_piece(_: Any) -> bool:
+            nonlocal done
+            if (piece := next(coming, None)) is None:  # some lane is late
+                return False
+            knot, parameters, changes = piece
+            while times[done] <= knot:
+                found[done] = engine.update_d_output(np.full(self.width, times[done]))
+                done += 1
+            for series, values in changes:
+                read[1][knots.places[series]] = values[:, None]
+            read[0][:] = parameters[:, None]
+            return True
+
+        start, end = (np.full(self.width, places[one]) for one in (number - 1, last))
+        bounds = np.minimum(longest, places[number] - places[number - 1])
+        engine.propagate_until(end, max_delta_t=bounds, callback=next_piece, write_tc=True)
+        if all(steps == count and code == _ARRIVED for code, _, _, steps in engine.propagate_res):
+            return done, count
+        engine.set_time(start)
+        engine.state[:] = before
+        self._enter(knots.pieces.parameters(number), [])
+        return begun, 0

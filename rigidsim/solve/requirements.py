@@ -58,13 +58,18 @@ def requirement_of(system: System) -> Requirement:
 class SetAtKnots(Requirement):
     """Parameters and states set where pieces of the equations begin, and steps end: at rows of tables, say.
     Any number of times gives the same bits.
+
+    Attributes:
+        places: of each series' states among the system's.
+        parameters: how many there are.
     """
 
     def __init__(self, system: System) -> None:
         assert system.pieces is not None
         self.pieces = system.pieces
         places = ([system.states.index(name) for name in x.states] for x in self.pieces.series)
-        self._places = [_slice_if_any(place) for place in places]
+        self.places = [_slice_if_any(place) for place in places]
+        self.parameters = len(self.pieces.parameters(0))
         self._entered: tuple[int, int] | None = None
         self._equal = _equal_pieces(self.pieces.knots)
 
@@ -73,15 +78,20 @@ class SetAtKnots(Requirement):
         pieces = self.pieces
         high, low = integrator.dtime
         number = pieces.number_at(high)
-        if number and high == pieces.knots[number - 1]:
-            if low != 0:
-                integrator.dtime = (high, high * 0)
+        if not number:
+            return number
+        knot = pieces.knots[number - 1]
+        length = abs(knot) if number < 2 else max(abs(knot), knot - pieces.knots[number - 2])
+        # a step that ends there may have been rounded to go some last bits beyond
+        if length * 4 + (high - knot) == length * 4:
+            if high != knot or low != 0:
+                integrator.dtime = (knot, knot * 0)
             self._change(integrator, pieces.changes(number))
         return number
 
     def _change(self, integrator: TaylorEngine, changes: list[tuple[int, np.ndarray]]) -> None:
         for series, values in changes:
-            integrator.state[self._places[series]] = values
+            integrator.state[self.places[series]] = values
 
     def meet(self, integrator: TaylorEngine) -> Scalar | None:
         number = self.enter(integrator)
@@ -95,9 +105,9 @@ class SetAtKnots(Requirement):
 
     def far(self, begin: tuple[Scalar, Scalar], end: Scalar, until: Scalar | None) -> Far | None:
         knots, number = self.pieces.knots, self.pieces.number_at(end)
-        if number < 2 or not len(self._equal) or begin != (knots[number - 2], 0):
+        if number < 2 or begin != (knots[number - 2], 0):
             return None
-        last = min(self._equal[number - 1], number - 1 + _MOST_PIECES)
+        last = self.last_alike(number - 1, _MOST_PIECES)
         while last >= number and until is not None and knots[last] > until:
             last -= 1
         if last < number:
@@ -117,6 +127,12 @@ class SetAtKnots(Requirement):
             return True
 
         return knots[last], knots[number - 1] - knots[number - 2], passed
+
+    def last_alike(self, number: int, most: int) -> int:
+        """Number of the last knot, at most so many after one, before which all pieces have exactly the length
+        of the piece that ends there; a smaller one if that isn't known to be any.
+        """
+        return min(int(self._equal[number]), number + most) if number < len(self._equal) else number - 1
 
     def _end(self, number: int) -> Scalar | None:
         knots = self.pieces.knots

@@ -43,7 +43,8 @@ MOST_OF_A_CLOSED_FORM = 1e6
 
 _NEAR = 0.5  # singular factor: the body turns by less than half a turn between points below it, on one side
 _LOOKED_AT = 2.0**-16  # singular factor, in double precision, below which it is worked out in the run's own
-_DOUBTFUL = 2.0  # rad: a jump by more is looked at in parts; one that is missed by a turn is larger than 4
+DOUBTFUL = 2.0
+"""Jump (rad) from which on it is looked at in parts; one that is missed by a turn is larger than 4."""
 _POLE = 1e-6  # size of an angle's sine and cosine below which jumps aren't looked at
 _PARTS, _DEPTH = 16, 4  # parts of a part, and how often
 _STEPS = 1000  # between two rows, at most
@@ -189,7 +190,7 @@ class JoinedAngles:
         all_angles = np.vstack([before, angles])
         jumps = self.jumps(all_angles)
         begins = [known.time, *times[:-1]]
-        fast = np.flatnonzero(rates * (times - begins) > _DOUBTFUL)  # where the rates' bound is an estimate
+        fast = np.flatnonzero(rates * (times - begins) > DOUBTFUL)  # where the rates' bound is an estimate
         for row in {*self._doubtful(jumps, all_angles, sizes).tolist(), *fast.tolist()}:
             state, chart = (states[row - 1], int(block.chart[row - 1])) if row else (known.state, known.chart)
             if state is not None:
@@ -280,7 +281,7 @@ class JoinedAngles:
     def _doubtful(self, jumps: np.ndarray, angles: np.ndarray, sizes: np.ndarray) -> np.ndarray:
         """Rows whose turns the row before doesn't determine because an angle is near its pole."""
         found = np.zeros(len(jumps), dtype=bool)
-        large = np.abs(jumps) > _DOUBTFUL
+        large = np.abs(jumps) > DOUBTFUL
         for variable in self.variables:
             part = self._parts[variable.name]
             if variable.poles is None:
@@ -309,7 +310,7 @@ class JoinedAngles:
         scalars = self._precision.of_doubles(states.ravel()).reshape(states.shape)
         angles, *_ = self._evaluated(scalars, self._precision.of_doubles(times), np.full(len(times), chart))
         jumps = self.jumps(angles)
-        for i in np.flatnonzero(np.abs(jumps).max(axis=1) > _DOUBTFUL) if depth > 1 else ():
+        for i in np.flatnonzero(np.abs(jumps).max(axis=1) > DOUBTFUL) if depth > 1 else ():
             jumps[i] = self._looked_at(times[i], states[i], chart, times[i + 1], jumps[i], depth - 1)
         return np.asarray(jumps.sum(axis=0))
 

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property, lru_cache, partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import heyoka as hy
 import numpy as np
@@ -41,16 +41,18 @@ from rigidsim.scene.swept import Swept, SweptContext, SweptExact, Untraceable
 from rigidsim.solve.compiled import compiled_function, evaluate_rows
 from rigidsim.solve.effects.effect import registered_effects
 from rigidsim.solve.events import BESIDE, STATES, TIMES, exponents_of
-from rigidsim.solve.lanes import BatchEngine, LaneResults, recommended_width
+from rigidsim.solve.lanes import LANES_OF_A_TABLE, BatchEngine, LaneResults, recommended_width
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, prepare
+from rigidsim.solve.requirements import SetAtKnots
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
+from rigidsim.solve.turns import DENSE, DOUBTFUL, nearest, radians_between_samples
 
 _HELD = 1 << 16  # values of axes that are held, each worked out once for all members that share it
 _AT_ONCE = 4096  # members whose numbers are worked out together
 _MOST_KNOWN = 256  # families that a process keeps for later members
-_SWEPT_TABLES = ("body", "initial", "loads", "rotors", "parameters")
+_SWEPT_TABLES = ("body", "initial", "loads", "rotors", "parameters", "tides")
 """Config tables whose numbers may become parameters."""
 _DOUBLE = precision_of("double")
 
@@ -78,7 +80,7 @@ NotBatchable = Enum(
         "KEY": "what is swept is not a number of the body, the start, a load, a rotor or a parameter",
         "UNTRACEABLE": "the equations depend on what is swept in a way that can't be determined beforehand",
         "FAMILIES": "too few members share a system of equations",
-        "AVERAGED": "averages over the rotation are worked out for each body by itself",
+        "AVERAGED": "the error of an averaged model is measured run by run",
         "RANGE": "a coefficient is outside the range of double precision",
     },
 )
@@ -98,7 +100,7 @@ def batchable(experiment: Experiment, keys: Sequence[str]) -> NotBatchable | Non
         NotBatchable.METHOD: integrator.method != DEFAULT_METHOD,
         NotBatchable.HELD: integrator.hold_invariants is True,
         NotBatchable.CHART: not variables_named(integrator.formulation).regular,
-        NotBatchable.AVERAGED: config.model.level != FULL,
+        NotBatchable.AVERAGED: config.model.level != FULL and config.output.estimate,
         NotBatchable.ORIENTATION: config.output.orientation is not None,
         NotBatchable.LYAPUNOV: config.output.lyapunov,
         NotBatchable.KEY: any(Path.of(key).steps[0] not in _SWEPT_TABLES for key in keys),
@@ -110,11 +112,13 @@ def _reason_of_system(prepared: InitialValueProblem, system: System) -> NotBatch
     # angles in so large a unit are never wrapped here: what follows from them is joined
     unwrapped = bool(system.angle_states and system.angle_unit)
     known = {"", "wrapped", "parity"} if unwrapped else {"", "nearest"}
+    averaged = not system.formulation.resolves_rotation
+    known |= {"unwrap"} if averaged else set()
     reasons = {
         NotBatchable.EFFECT: bool(registered_effects(system, _DOUBLE)),
         NotBatchable.SWITCHING: system.switches,
         NotBatchable.MOVED_MASS: len(system.crossings) > len(system.events),
-        NotBatchable.TABLE: system.pieces is not None,
+        NotBatchable.TABLE: (system.pieces is not None and not averaged) or system.mechanics.sky is not None,
         NotBatchable.MOMENT: system.clocked,
         NotBatchable.NUTATION: prepared.system.in_two_parts,
         NotBatchable.BODIES: system.scene.bodies is not None,
@@ -122,6 +126,10 @@ def _reason_of_system(prepared: InitialValueProblem, system: System) -> NotBatch
         NotBatchable.ANGLES: not {r.continuity for r in system.recorded} <= known,
     }
     return next((reason for reason, holds in reasons.items() if holds), None)
+
+
+_Prepared: TypeAlias = "tuple[PreparedFamily, np.ndarray] | NotBatchable | ConfigError"
+"""The family of a member and its numbers, why it runs by itself, or why it is refused."""
 
 
 class AxisNumbers:
@@ -133,6 +141,8 @@ class AxisNumbers:
         self._reals = lru_cache(_HELD)(self._reals_of)
         self._context = SweptContext(context_for("double"), (), 0)
         self.known: list[Family] = []
+        self.alike: list[PreparedFamily] = []
+        self.prepared: dict[int, _Prepared] = {}
 
     @cached_property
     def drive(self) -> EstimatedEffect | None:
@@ -205,6 +215,32 @@ class Members:
         """A member's exact numbers for ``keys``, SI."""
         return [x for place, which in self._swept for x in self.sweep.axes[place].exact(int(which[member]))]
 
+    def prepared(self, member: int) -> _Prepared:
+        """What a member of an averaged model is sorted by, worked out once."""
+        known, number = self.axes.prepared, int(self._chosen[member])
+        if number not in known:
+            if len(known) >= _HELD:
+                known.clear()
+            known[number] = self._prepare(member)
+        return known[number]
+
+    def _prepare(self, member: int) -> _Prepared:
+        try:
+            prepared = prepare(self.experiment(member))
+        except ConfigError as error:
+            return error
+        reason = _reason_of_system(prepared, prepared.system)
+        if reason is not None:
+            return reason
+        kind = int(self.kinds[member])
+        for family in self.axes.alike:
+            if family.kind == kind and (numbers := family.numbers_of(prepared)) is not None:
+                return family, numbers
+        self.axes.alike.append(PreparedFamily(prepared, kind))
+        del self.axes.alike[:-_MOST_KNOWN]
+        numbers = self.axes.alike[-1].numbers
+        return NotBatchable.UNTRACEABLE if numbers is None else (self.axes.alike[-1], numbers)
+
     def columns(self, members: np.ndarray) -> list[np.ndarray]:
         """The numbers of some members for each key (see ``AxisNumbers``)."""
         return [x for place, which in self._swept for x in self.axes.columns(place, which[members])]
@@ -219,9 +255,11 @@ class Family:
         members: places in ``Members``, (members,).
         initial: (states, members), internal units.
         parameters: values of ``variables``, (parameters, members).
+        radians: between samples, of averaged motions whose angles are followed, (members,).
     """
 
     members: np.ndarray
+    radians: np.ndarray
     initial: np.ndarray
     parameters: np.ndarray
     _doubles: dict[int, np.ndarray]
@@ -272,6 +310,12 @@ class Family:
         return self.doubles(value).astype(np.int64)
 
     @cached_property
+    def knots(self) -> SetAtKnots | None:
+        """What is set where pieces of the equations begin, the same for all members; None without."""
+        system = self.prepared.system
+        return None if system.pieces is None else SetAtKnots(system)
+
+    @cached_property
     def moving(self) -> int:
         """Number of states of the motion; a tangent vector's states follow."""
         return sum(not name.startswith(TANGENT) for name in self.system.states)
@@ -285,11 +329,85 @@ class Family:
         return [k for k, v in enumerate(self.variables) if str(v) in read]
 
     def as_parameters(self, expressions: Sequence[Any]) -> list[Any]:
-        """Expressions with the parameters as ``hy.par``, numbered as in ``in_equations``."""
-        variables = self.variables
-        table = {variables[k]: hy.par[n] for n, k in enumerate(self.in_equations)}
+        """Expressions with the parameters as ``hy.par``: first those of pieces, then ``in_equations``."""
+        variables, first = self.variables, 0 if self.knots is None else self.knots.parameters
+        table = {variables[k]: hy.par[first + n] for n, k in enumerate(self.in_equations)}
         found = [hy.expression(x) for x in expressions]
         return hy.subs(found, table) if table else found
+
+
+class PreparedFamily(Family):
+    """Members of averaged models, each worked out by itself, whose equations are equal but for numbers: each
+    distinct number of the first member is a parameter, but 0, 1 and -1, which make equations simpler.
+    """
+
+    def __init__(self, prepared: InitialValueProblem, kind: int) -> None:
+        self.prepared, self.kind = prepared, kind
+        self._of_number: dict[float, Any] = {}
+        self._calls: list[float] = []
+        self.system = self._rebuilt(prepared, self._number)
+        self.numbers = self.numbers_of(prepared)
+
+    @staticmethod
+    def _rebuilt(prepared: InitialValueProblem, number: Callable[[Any], Any]) -> System:
+        """A member's system with other numbers, which are asked for always in the same order."""
+        system = System(prepared.system.plan, number)
+        for part in ("equations", "outputs", "invariants", "crossings"):
+            getattr(system, part)
+        return system
+
+    def _number(self, value: Any) -> Any:
+        number = float(_DOUBLE.number(value))
+        self._calls.append(number)
+        if number in (-1, 0, 1):
+            return number
+        return self._of_number.setdefault(number, hy.make_vars(f"swept_{len(self._of_number)}"))
+
+    @property
+    def variables(self) -> list[Any]:
+        """See ``Family``."""
+        return list(self._of_number.values())
+
+    def numbers_of(self, prepared: InitialValueProblem) -> np.ndarray | None:
+        """Radians between samples, initial states and values of ``variables`` of a member, (1 + states +
+        parameters,); None if its equations differ in more than these.
+        """
+        calls: list[float] = []
+
+        def noting(value: Any) -> Any:
+            calls.append(float(_DOUBLE.number(value)))
+            return calls[-1]
+
+        own, system, first = self._rebuilt(prepared, noting), prepared.system, self.prepared.system
+        found: dict[float, float] = {}
+        for known, number in zip(self._calls, calls, strict=False):
+            if found.setdefault(known, number) != number or (known in (-1, 0, 1) and known != number):
+                return None
+        numbers = {variable: hy.expression(found.get(x, x)) for x, variable in self._of_number.items()}
+        units = [
+            (x.states, x.scaling, x.state_exponents, [one.exponents for one in x.recorded])
+            for x in (system, first)
+        ]
+        alike = units[0] == units[1] and len(calls) == len(self._calls)
+        alike = alike and list(system.plan.tables.items()) == list(first.plan.tables.items())
+        if not alike or hy.subs(_expressions(self.system), numbers) != _expressions(own):
+            return None
+        initial, values = map(_DOUBLE.number, system.initial), (found[x] for x in self._of_number)
+        return np.array([radians_between_samples(system), *initial, *values])
+
+    def having(self, members: Sequence[int], numbers: Sequence[np.ndarray]) -> PreparedFamily:
+        """The family with members and their numbers (see ``numbers_of``)."""
+        part, every = copy.copy(self), np.array(numbers).T
+        part.members, states = np.array(members), len(self.system.states)
+        part.radians, part.initial, part.parameters = every[0], every[1 : 1 + states], every[1 + states :]
+        return part
+
+
+def _expressions(system: System) -> list[Any]:
+    """All of a system's expressions."""
+    found = [right for _, right in system.equations] + [one.expression for one in system.crossings]
+    found += [x for invariant in system.invariants for x in invariant.expressions]
+    return [hy.expression(x) for x in [*found, *system.outputs]]
 
 
 @dataclass
@@ -354,6 +472,8 @@ class Families:
         try:
             experiment = self._members.experiment(first)
             reason = batchable(experiment, self._members.keys)
+            if reason is None and experiment.config.model.level != FULL:
+                return self._prepared(candidates)
             if reason is None:
                 family = self._worked_out(experiment, first, context)
                 reason = _reason_of_system(family.prepared, family.system)
@@ -368,6 +488,23 @@ class Families:
         taken = candidates[context.agree]
         found.alone |= dict.fromkeys(taken.tolist(), reason)
         return taken
+
+    def _prepared(self, candidates: np.ndarray) -> np.ndarray:
+        """Sort members of averaged models, each worked out by itself, until too many are refused."""
+        groups: dict[PreparedFamily, dict[int, np.ndarray]] = {}
+        for count, member in enumerate(candidates.tolist()):
+            if len(self._sorted.refused) == self._most_refused:
+                candidates = candidates[:count]
+                break
+            found = self._members.prepared(member)
+            if isinstance(found, NotBatchable):
+                self._sorted.alone[member] = found
+            elif isinstance(found, ConfigError):
+                self._sorted.refused[member] = found
+            else:
+                groups.setdefault(found[0], {})[member] = found[1]
+        self._sorted.groups += [one.having([*rows], [*rows.values()]) for one, rows in groups.items()]
+        return candidates
 
     def _worked_out(self, experiment: Experiment, first: int, context: SweptContext) -> Family:
         """The family of the first of some members.
@@ -446,7 +583,7 @@ class BatchRun:
     """Runs a family's members; by default with the processor's own width."""
 
     def __init__(self, family: Family, width: int | None = None) -> None:
-        self.width = width or recommended_width()
+        self.width = width or (recommended_width() if family.knots is None else LANES_OF_A_TABLE)
         self._family, self._system = family, family.system
         self._clocks: dict[int, SampleClock] = {}
         system = self._system
@@ -469,7 +606,7 @@ class BatchRun:
 
     def blocks(self) -> Iterator[BatchBlock]:
         """Run the members, as many at a time as fit into memory."""
-        samples = self._family.prepared.clock.count
+        samples = self._family.prepared.clock.count * self._parts
         each = samples * (len(self._system.states) + len(self._system.outputs))
         most = max(_VALUES_AT_ONCE // each // self.width, 1) * self.width
         # members with about as many steps run side by side, so that none waits for long
@@ -482,6 +619,7 @@ class BatchRun:
         initial, swept = family.initial[:, part], family.parameters[:, part]
         moving, read = initial[: self._family.moving], swept[self._family.in_equations]
         start, times = self._times(family.whole_numbers(self._system.scaling.time)[part])
+        samples, times = slice(None, None, self._parts), self._between(times)
         most = self._most_steps(start, times)
         parameters = np.concatenate([read, self._of_events(moving, swept, start, times[-1])])
         lanes, along = self._plain.run(moving, parameters, start, times, most), None
@@ -490,8 +628,10 @@ class BatchRun:
         begun = self._evaluated(self._components, moving[None], swept, start[None])[:, 0]
         found = self._outputs(lanes.states, swept, times, begun, along)
         values, first = self._in_si(found, part), len(found) - len(self._system.invariants)
-        self._join(values, part)
-        drifts = {f"{one.name}_drift": found[first + n] for n, one in enumerate(self._system.invariants)}
+        doubtful, values = self._join(values, part), {name: x[samples] for name, x in values.items()}
+        invariants = enumerate(self._system.invariants)
+        drifts = {f"{one.name}_drift": found[first + n][samples] for n, one in invariants}
+        lanes, times = replace(lanes, states=lanes.states[samples]), times[samples]
         block = BatchBlock(
             family.members[part],
             part,
@@ -501,7 +641,7 @@ class BatchRun:
             lanes.states,
             values,
             drifts,
-            self._status(lanes, most),
+            self._status(lanes, most, doubtful),
             _reached(lanes),
             lanes.steps,
             self._family.prepared.drift_bound(lanes.steps),
@@ -520,12 +660,16 @@ class BatchRun:
         rights = self._family.as_parameters([right for _, right in system.equations[:states]])
         equations = list(zip(system.variables[:states], rights, strict=True))
         loose = None if tolerance is None else float(tolerance)
-        return BatchEngine(equations, self.width, events=events, tolerance=loose, compact=system.wide)
+        knots = self._family.knots
+        return BatchEngine(
+            equations, self.width, events=events, tolerance=loose, compact=system.wide, knots=knots
+        )
 
     @cached_property
     def _plain(self) -> BatchEngine:
         """The motion; each event has a shift and a factor as parameters after the equations' own."""
         expressions, first = self._family.as_parameters(self._crossings), len(self._family.in_equations)
+        first += 0 if self._family.knots is None else self._family.knots.parameters
         events = [
             ((expression + hy.par[first + 2 * n]) * hy.par[first + 2 * n + 1], crossing.direction)
             for n, (expression, crossing) in enumerate(zip(expressions, self._system.crossings, strict=True))
@@ -571,18 +715,34 @@ class BatchRun:
             columns[:, same] = clock.internal(0, clock.count)[:, None]
         return start, columns
 
+    @cached_property
+    def _parts(self) -> int:
+        """Parts of what is between samples, at whose ends turns of angles are counted."""
+        if all(variable.continuity != "unwrap" for variable in self._system.recorded):
+            return 1
+        return max(1, math.ceil(self._family.radians.max() / DENSE))
+
+    def _between(self, times: np.ndarray) -> np.ndarray:
+        """Times with those between them, (1 + (samples - 1) parts, m)."""
+        if self._parts == 1 or len(times) < 2:
+            return times
+        shares = (np.arange(self._parts) / self._parts)[None, :, None]
+        between = times[:-1, None] + shares * np.diff(times, axis=0)[:, None]
+        return np.concatenate([between.reshape(-1, times.shape[1]), times[-1:]])
+
     def _most_steps(self, start: np.ndarray, times: np.ndarray) -> int:
         asked = self._family.prepared.scene.config.limits.max_steps
         longest = float((times[-1] - start).max())
         given_up = _MOST_STEPS + int(min(_STEPS_PER_UNIT * longest, 1e12))
         return given_up if asked is None else min(int(asked), given_up)
 
-    def _status(self, lanes: LaneResults, most: int) -> np.ndarray:
+    def _status(self, lanes: LaneResults, most: int, doubtful: np.ndarray) -> np.ndarray:
         asked = self._family.prepared.scene.config.limits.max_steps
         short = Status.MAX_STEPS if asked is not None and most == int(asked) else None
         found = np.full(len(lanes.arrived), Status.FINISHED, dtype=object)
         found[~lanes.arrived] = short
         found[~lanes.arrived & ~lanes.finite] = Status.NON_FINITE
+        found[doubtful] = None
         return found
 
     # --- events and guards ----------------------------------------------------------------------------------
@@ -661,17 +821,25 @@ class BatchRun:
             values[variable.name] = np.stack(columns, axis=2)
         return values
 
-    def _join(self, values: Values, part: np.ndarray) -> None:
-        """Give each quaternion the sign nearest to the one before, as in a single run."""
+    def _join(self, values: Values, part: np.ndarray) -> np.ndarray:
+        """Give each quaternion the sign nearest to the one before, and count full turns of angles, as in a
+        single run. Returns the members whose samples don't show all turns, (m,).
+        """
+        doubtful: np.ndarray = np.zeros(len(part), dtype=bool)
         for variable in self._system.recorded:
-            if variable.continuity != "nearest":
-                continue
             block = values[variable.name]
-            begin = [self._family.doubles(x)[part] for x in self._system.scene.quaternion]
-            before = np.concatenate([np.stack(begin, axis=1)[None], block[:-1]])
-            products = np.einsum("smc,smc->sm", block, before)
-            signs = np.cumprod(np.where(products < 0, -1.0, 1.0), axis=0)
-            block *= signs[:, :, None]
+            if variable.continuity == "nearest":
+                begin = [self._family.doubles(x)[part] for x in self._system.scene.quaternion]
+                before = np.concatenate([np.stack(begin, axis=1)[None], block[:-1]])
+                products = np.einsum("smc,smc->sm", block, before)
+                signs = np.cumprod(np.where(products < 0, -1.0, 1.0), axis=0)
+                block *= signs[:, :, None]
+            elif variable.continuity == "unwrap":
+                steps = np.diff(block, axis=0)
+                jumps = nearest(steps)
+                block[1:] += 2 * np.pi * np.cumsum(np.rint((jumps - steps) / (2 * np.pi)), axis=0)
+                doubtful |= ~(np.abs(jumps) <= DOUBTFUL).all(axis=(0, 2))
+        return doubtful
 
     def _compiled(self, expressions: Sequence[Any], along: bool = False) -> tuple[Any, list[int]]:
         """A compiled function of states, and the indices of the states and parameters that it takes."""

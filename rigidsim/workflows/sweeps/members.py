@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from rigidsim.accuracy.estimates import MemberErrors, MemberEstimates
+from rigidsim.accuracy.modelling import modelling_of
 from rigidsim.errors import ConfigError, MemberError, Problem, RigidsimError
 from rigidsim.model.tangents import GROWTH
 from rigidsim.scene.cautions import WarningCode
@@ -36,11 +37,12 @@ from rigidsim.solve.batch.family import (
     batchable,
 )
 from rigidsim.solve.indicators import indicators
+from rigidsim.solve.lanes import LANES_OF_A_TABLE
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.status import Status
 from rigidsim.store.netcdf import joined_parts
 from rigidsim.store.run import MemoryRun
-from rigidsim.store.summary import Modelling, Summary
+from rigidsim.store.summary import Modelling, Summary, UnmeasuredCode
 from rigidsim.store.sweeps.tiles import ALWAYS, Kept, KeptVariable
 from rigidsim.store.variables import Variable
 from rigidsim.workflows.analyse import analyse
@@ -341,8 +343,8 @@ def plain_variables(
     return found
 
 
-def _modelling_errors(found: Modelling) -> Kept:
-    """Errors of an averaged model, of a single member."""
+def _modelling_errors(found: Modelling, members: int = 1) -> Kept:
+    """Errors of an averaged model, the same for so many members."""
     errors = {
         "modelling_error": (found.worst, "directions", "rad"),
         "modelling_error_norm": (found.angular_momentum_norm, "angular_momentum_norm, relative", "1"),
@@ -350,7 +352,7 @@ def _modelling_errors(found: Modelling) -> Kept:
     }
     until = "largest error of the averaged model's {} until the end"
     return {
-        name: kept(np.array([error], dtype=float), units, until.format(what))
+        name: kept(np.full(members, error, dtype=float), units, until.format(what))
         for name, (error, what, units) in errors.items()
         if error is not None or name == "modelling_error"
     }
@@ -430,6 +432,7 @@ _ONE_BY_ONE = ("frequencies",)
 _LOOKED_AT, _COUNTED = 64, 4096  # members by which a sweep is judged, by their equations and by their kinds
 _MOST_KINDS, _LEAST_MEMBERS = 64, 8
 """Up to so many kinds of members have batches however few members they have; more need so many each."""
+_NOT_ASKED = UnmeasuredCode.NOT_ASKED.value
 _MOST_AHEAD = 4  # families compiled before the first tile
 
 
@@ -475,6 +478,12 @@ class BatchTiles:
             return found.alone[min(found.alone)]
         many = self._sweep.count > _LOOKED_AT and 2 * len(found.groups) > _LOOKED_AT
         return NotBatchable.FAMILIES if many else None
+
+    @cached_property
+    def lanes_of_a_table(self) -> int:
+        """How many members pass the rows of a table together; 0 without one, or if they run one by one."""
+        groups = [] if self.alone is not None else self._sample.groups
+        return LANES_OF_A_TABLE if any(family.knots is not None for family in groups) else 0
 
     def _kinds(self) -> tuple[int, int]:
         """Number of kinds (see ``Members``) among some members, and the number of these."""
@@ -524,13 +533,15 @@ class BatchTiles:
             batch = BatchRun(family)
             estimates = MemberEstimates(family, batch.width) if self._estimated else None
             variables = [v for v in dataset_variables(family.prepared) if "units" in v.attributes]
+            averaged = family.prepared.system.formulation.average is not None
+            modelling = modelling_of(family.prepared, how="", unmeasured=_NOT_ASKED) if averaged else None
             for block in batch.blocks():
                 before = time.process_time()
                 errors = estimates.of(block) if estimates is not None else None
                 spent = time.process_time() - before
                 done = np.array([status is not None for status in block.status], dtype=bool)
                 if done.any():
-                    results = self._results(variables, block, errors, done, keep, spent)
+                    results = self._results(variables, block, errors, modelling, done, keep, spent)
                     parts.append((block.members[done], results))
                 if not done.all():
                     left += block.members[~done].tolist()
@@ -550,8 +561,8 @@ class BatchTiles:
         return self._sweep.base.config.output.estimate
 
     def _results(
-        self, variables: Sequence[Variable], block: BatchBlock, errors: MemberErrors | None, done: np.ndarray,
-        keep: Sequence[str], estimating: float,
+        self, variables: Sequence[Variable], block: BatchBlock, errors: MemberErrors | None,
+        modelling: Modelling | None, done: np.ndarray, keep: Sequence[str], estimating: float,
     ) -> MemberResults:  # fmt: skip
         """Results of those members of a block that are ``done``."""
         sweep = self._sweep
@@ -572,6 +583,8 @@ class BatchTiles:
             attitude_error=None if errors is None else errors.attitude,
             position_error=None if errors is None else errors.position,
         )
+        if modelling is not None:
+            kept |= _modelling_errors(modelling, len(done))
         kept = {name: replace(v, values=v.values[done]) for name, v in kept.items()}
         statuses = [status for status in block.status if status is not None]
         reasons = {i: one.message for i, one in enumerate(statuses) if one.value not in ENDED_WELL}

@@ -16,7 +16,14 @@ from rigidsim.store.summary import SummaryPart
 from rigidsim.store.sweeps.tiles import OF_FITS, RESERVED, SUFFIXES
 from rigidsim.workflows.fit.observations import FitKeys
 from rigidsim.workflows.plan import RunPlan, plan
-from rigidsim.workflows.sweeps.members import batches_of, first_possible, markable, recording, why_alone
+from rigidsim.workflows.sweeps.members import (
+    BatchTiles,
+    batches_of,
+    first_possible,
+    markable,
+    recording,
+    why_alone,
+)
 
 _ALL = 200
 """Up to this many members are all worked out, with their equations where numbers alone don't decide. Of more,
@@ -44,6 +51,7 @@ _RUNS_OF_A_FIT = 15  # so long a fit takes, in runs (docs/fits.md#what-it-costs)
 _LARGEST_TILE_BYTES = 64e6
 _BUILD_SECONDS = 0.2  # seconds to compile equations for each member that runs by itself
 _BATCH_SECONDS = 2e-5  # seconds of overhead per member of a batch besides its integration
+_GAINED = 8.0  # what lanes gain along a table, of which each row takes as long for one as for all
 _ESTIMATED = 2.5  # cost ratio of a batch member with estimated errors to one without
 
 
@@ -65,15 +73,14 @@ def check_sweep(sweep: Sweep, *, most: float = math.inf) -> InitialValueProblem:
 
 
 def _problems(sweep: Sweep, most: float) -> list[Problem]:
-    if problems := _worked_out(sweep, _FEWER):
-        return problems
     # members that share equations are judged by their numbers alone, up to a block of which none does
     shared = sweep.count <= most and why_alone(sweep, ()) in ("", "wall_time", "asked")
+    if not (shared and _batches(sweep).lanes_of_a_table) and (problems := _worked_out(sweep, _FEWER)):
+        return problems
     accepted = 0
     for first in range(0, sweep.count if shared else 0, _AT_ONCE):
         block = range(first, min(first + _AT_ONCE, sweep.count))
-        batches = batches_of(sweep.experiment.text, sweep.experiment.source)
-        refused, some = batches.refused(block, _MOST_SHOWN)
+        refused, some = _batches(sweep).refused(block, _MOST_SHOWN)
         if refused:
             blamed = [sweep.with_member_named(one, refused[one]) for one in sorted(refused)[:_MOST_SHOWN]]
             return [problem for error in blamed for problem in error.problems]
@@ -160,6 +167,8 @@ def tile_length(sweep: Sweep, made: RunPlan | None = None) -> int:
         return sweep.table.tile
     if sweep.fits:
         return max(1, sweep.count // _TILES_OF_FITS)
+    if not why_alone(sweep, sweep.table.keep) and (lanes := _batches(sweep).lanes_of_a_table):
+        return min(lanes, sweep.count)
     if sweep.count <= _FEW:
         return max(1, -(-sweep.count // _TILES_OF_FEW))
     first = first_possible(sweep)
@@ -172,17 +181,21 @@ def tile_length(sweep: Sweep, made: RunPlan | None = None) -> int:
     return length
 
 
+def _batches(sweep: Sweep) -> BatchTiles:
+    return batches_of(sweep.experiment.text, sweep.experiment.source)
+
+
 def _member_seconds(sweep: Sweep, made: RunPlan) -> float:
     predicted = made.predicted
     seconds = predicted.integration_seconds + predicted.recording_seconds
     if (fit := sweep.base.config.fit) is not None:
         return fit.starts * _RUNS_OF_A_FIT * seconds + max(predicted.building_seconds, _BUILD_SECONDS)
-    if (
-        why_alone(sweep, sweep.table.keep)
-        or batches_of(sweep.experiment.text, sweep.experiment.source).alone is not None
-    ):
+    alone = why_alone(sweep, sweep.table.keep)
+    if alone or _batches(sweep).alone is not None:
         beside = predicted.choosing_seconds + predicted.modelling_seconds
         return seconds + max(predicted.building_seconds, _BUILD_SECONDS) + beside
+    if _batches(sweep).lanes_of_a_table:
+        return seconds / _GAINED
     each = _ESTIMATED if sweep.base.config.output.estimate else 1.0
     # half of what lanes could gain
     return each * seconds / max(1.0, recommended_width() / 2) + _BATCH_SECONDS
