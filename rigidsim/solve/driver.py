@@ -177,7 +177,7 @@ class Driver:
         if taken := self.stepper.steps - boundary.steps:
             self._length = (float(self.stepper.time) - float(boundary.time[0])) / taken
             pace = taken / max(time.perf_counter() - started, 1e-9)
-            self._at_once = max(1, min(2 * self._at_once, int(pace * self._pacing.chunk_seconds)))
+            self._at_once = max(1, min(8 * self._at_once, int(pace * self._pacing.chunk_seconds)))
         return finite
 
     def _steps_to(self, moment: Scalar) -> int:

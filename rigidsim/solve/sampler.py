@@ -69,7 +69,7 @@ class SampleReceiver(Protocol):
 class Pacing:
     """Amounts; no bit depends on them. Ctrl-C is heeded after no more than a chunk and its hand-over."""
 
-    chunk_seconds: float = 0.05  # between checks of guards and Ctrl-C; well below what a user waits
+    chunk_seconds: float = 0.1  # between checks of guards and Ctrl-C; well below what a user waits
     patience: float = 2.0  # seconds until samples of a slow run are handed over
     rows_at_once: int = 8192  # samples in a block that is evaluated; more are no faster, and take memory
     rows_waiting: int = 65536  # in memory before they are evaluated: 8 MB in double precision

@@ -50,6 +50,11 @@ class SamplesWithin:
         self.states: Any = []  # or an array (n, states)
         self.ended = False
 
+    @property
+    def upcoming(self) -> Scalar | None:
+        """The next sample's time; None after the last."""
+        return self.times[len(self.states)] if len(self.states) < len(self.times) else None
+
     def __call__(self, engine: TaylorEngine) -> bool:
         """Take those within the engine's step; False if it asks to end the call."""
         return self.passed(engine.time, engine.update_d_output)

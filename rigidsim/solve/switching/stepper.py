@@ -34,7 +34,7 @@ from rigidsim.model.system import System
 from rigidsim.solve.compiled import TaylorEngine, interruptible
 from rigidsim.solve.events import BESIDE, EventLog, engine_events, of_order_one
 from rigidsim.solve.precision import Precision, Scalar
-from rigidsim.solve.requirements import SetAtKnots
+from rigidsim.solve.requirements import SetAtKnots, StepCallback
 from rigidsim.solve.stepper import Mark, SamplesWithin, bound_of_sparse_series, may_be_sparse
 from rigidsim.solve.switching.moments import Moments, between
 from rigidsim.solve.switching.sides import (
@@ -103,9 +103,7 @@ class SwitchingStepper(TaylorStepper):
     ) -> None:
         self._cut: tuple[int, int] | None = None  # surface on which the engine ended it, and the new side
         self._passed: list[_Passed] | None = None  # boundaries, while many steps are taken
-        self._samples: SamplesWithin | None = None
         self._halted = self._fresh = False
-        self._knot: tuple[Scalar, Scalar] | None = None  # at which the steps taken together end
         self._offset: list[int] = []  # parameters that are added to events
         self._ahead = _FIRST_AHEAD
         self._functions_by_chart: dict[int, SurfaceFunctions] = {}
@@ -360,20 +358,20 @@ class SwitchingStepper(TaylorStepper):
         self._set()
         self._quieten(self.time if self._crossed else None)
         engine, begun, known = self._integrator, self.mark(), 0 if samples is None else len(samples.states)
-        self._passed, self._samples, self._cut, self._halted = [], samples, None, False
+        self._passed, self._cut, self._halted = [], None, False
         self._fresh = bool(self._crossed) or not self.steps
-        self._knot = self._moments.following(engine.dtime)
-        ends = [x for x in (until, None if self._knot is None else self._knot[0]) if x is not None]
+        knot = self._moments.following(engine.dtime)
+        ends = [x for x in (until, None if knot is None else knot[0]) if x is not None]
         try:
             outcome, *_ = engine.propagate_until(
                 min(ends, default=self._far),
                 max_steps=most,
                 max_delta_t=self._longest,
-                callback=self._pass,
+                callback=self._noting(self._passed, knot, samples),
                 write_tc=True,
             )
         finally:
-            passed, self._passed, self._samples = self._passed, None, None
+            passed, self._passed = self._passed, None
         if passed:
             self.steps, self._crossed = self.steps + len(passed), passed[-1].crossed + 1
         kept, alone = self._holding(begun, passed)
@@ -391,40 +389,55 @@ class SwitchingStepper(TaylorStepper):
 
     def _crosses(self, engine: TaylorEngine, j: int, side: int) -> bool:
         """Go on beyond a surface on which a step ended among many; False if that has to be looked into."""
-        if side != -self._modes[j] or not self._counts(float(engine.time)):
+        time, first, pars, now = engine.time, self._count_of_pars, engine.pars, self._now.copy()
+        if side != -self._modes[j] or not self._counts(float(time)):
             return False
-        self._modes[j], first, self._now = side, self._count_of_pars, self._now.copy()
-        engine.pars[j] = self._now[j] = self._plus if side > 0 else self._minus
-        beside = self._functions.beside(engine.state, engine.time, self._now, j)
-        engine.pars[first + j] = self.precision.of_double(side * beside)
-        self._quieten(engine.time)
+        self._modes[j], self._now = side, now
+        pars[j] = now[j] = self._plus if side > 0 else self._minus
+        beside = self._functions.beside(engine.state, time, now, j)
+        pars[first + j] = self.precision.of_double(side * beside)
+        self._quieten(time)
         return True
 
-    def _pass(self, engine: TaylorEngine) -> bool:
-        """Note a boundary among many."""
-        time, knot, samples, passed = engine.dtime, self._knot, self._samples, self._passed
-        self._halted = self._halted or (knot is not None and (time >= knot or time[0] >= knot[0]))
-        if self._halted:
-            return False
-        assert passed is not None
-        first, crossed = self._count_of_pars, -1 if self._cut is None else self._cut[0]
-        offset = [] if crossed < 0 else [first + crossed]
-        for place in self._offset:
-            if place not in offset:
-                engine.pars[place] = self._off
-        if self._functions.clocked and self.system.pieces is None:
-            self._now = np.append(self._now[:-1], time[1])
-            if len(engine.pars) >= first:
-                engine.pars[first - 1] = time[1]
-        going = samples is None or samples(engine)
-        taken = 0 if samples is None else len(samples.states)
-        series, size = np.array(engine.tc) if self._fresh else None, abs(float(engine.last_h))
-        state, events, switches = np.array(engine.state), len(self.log.found), (self._count, self._since)
-        passed.append(_Passed(time, state, events, self._now, crossed, switches, taken, size, series))
-        if crossed < 0:
-            self._quieten(None)
-        self._offset, self._cut, self._fresh = offset, None, crossed >= 0
-        return going
+    def _noting(
+        self, passed: list[_Passed], knot: tuple[Scalar, Scalar] | None, samples: SamplesWithin | None
+    ) -> StepCallback:
+        """What notes each boundary among many; with few look-ups, as a step takes some ten times as long."""
+        engine, first, found, off = self._integrator, self._count_of_pars, self.log.found, self._off
+        state, pars = engine.state, engine.pars  # views that follow the engine
+        clocked = self._functions.clocked and self.system.pieces is None
+        taken, upcoming = (0, None) if samples is None else (len(samples.states), samples.upcoming)
+
+        def note(engine: TaylorEngine) -> bool:
+            nonlocal taken, upcoming
+            time, cut = engine.dtime, self._cut
+            if knot is not None and (time >= knot or time[0] >= knot[0]):
+                self._halted = True
+            if self._halted:
+                return False
+            crossed = -1 if cut is None else cut[0]
+            for place in self._offset:
+                if place != first + crossed:
+                    pars[place] = off
+            self._offset = [] if cut is None else [first + crossed]
+            if clocked:
+                self._now = np.append(self._now[:-1], time[1])
+                if len(pars) >= first:
+                    pars[first - 1] = time[1]
+            going = True
+            if samples is not None and (upcoming is None or time[0] >= upcoming):
+                going = samples(engine)
+                taken, upcoming = len(samples.states), samples.upcoming
+            series, size = np.array(engine.tc) if self._fresh else None, abs(float(engine.last_h))
+            now, switches = self._now, (self._count, self._since)
+            held = time, state.copy(), len(found), now, crossed, switches, taken, size, series
+            passed.append(tuple.__new__(_Passed, held))  # in a third of its own constructor's time
+            if cut is None and self.has_events:
+                self._quieten(None)
+            self._cut, self._fresh = None, cut is not None
+            return going
+
+        return note
 
     def _holding(self, begun: Mark, passed: list[_Passed]) -> tuple[int, bool]:
         """How many of the boundaries hold, and whether the step after these has to be taken by itself.
