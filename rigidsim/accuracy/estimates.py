@@ -319,10 +319,10 @@ def _over(share: float) -> str:
 
 def _everywhere(prepared: InitialValueProblem, error: float, how: str) -> Estimate:
     """Estimate of a relative error that is the same for all states."""
-    scene, attitude = prepared.scene, error if prepared.system.requirements.attitude else None
-    if not scene.free_flight:
+    attitude = error if prepared.system.requirements.attitude else None
+    if prepared.system.flown is None:
         return Estimate(attitude, error, how)
-    return Estimate(attitude, error, how, error * _size(scene.position), error * _size(scene.velocity))
+    return Estimate(attitude, error, how, *(error * size for size in _at_start(prepared.system)))
 
 
 # --- by a better solution ---------------------------------------------------------------------------------
@@ -394,7 +394,9 @@ def _apart(run: _Run, system: System, samples: Samples, there: np.ndarray) -> _S
         for name in of_charts[0].keys() & better.keys():
             own = np.array([of_charts[chart][name][n] for n, (_, _, _, chart) in enumerate(samples)])
             errors[name] = COMPARED * _distances(name, own, better[name])
-    return _Seen(times, errors, _size(prepared.scene.position), _size(prepared.scene.velocity))
+    if "partner" in errors:
+        errors["attitude"] = np.maximum(errors["attitude"], errors.pop("partner"))
+    return _Seen(times, errors, *_at_start(prepared.system))
 
 
 def _quantities(system: System, precision: Precision, states: np.ndarray) -> dict[str, np.ndarray]:
@@ -417,7 +419,7 @@ def _distances(name: str, one: np.ndarray, other: np.ndarray) -> np.ndarray:
     own precision.
     """
     apart, size = one - other, other.astype(float)
-    if name != "attitude":
+    if name not in ("attitude", "partner"):
         whole = np.linalg.norm(size, axis=1) if name == "rates" else np.ones(len(size))
         return np.asarray(np.linalg.norm(apart.astype(float), axis=1) / np.where(whole > 0, whole, 1.0))
     if one.shape[1] == 3:
@@ -434,8 +436,13 @@ def label_rounding(prepared: InitialValueProblem, seconds: float) -> float:
     return LABEL * float(prepared.precision.epsilon) * late
 
 
-def _size(vector: object) -> float:
-    return math.hypot(*(float(x) for x in vector)) if vector is not None else 0.0  # type: ignore[attr-defined]
+def _at_start(system: System) -> tuple[float, float]:
+    """Distance (m) and speed (m/s) at the start of what flies; zeros without."""
+    if (flown := system.flown) is None:
+        return 0.0, 0.0
+    at = [[system.states.index(name) for name in names] for names in (flown.position, flown.velocity)]
+    sizes = [[math.ldexp(float(system.initial[k]), int(system.state_exponents[k])) for k in of] for of in at]
+    return math.hypot(*sizes[0]), math.hypot(*sizes[1])
 
 
 # --- by tangents ------------------------------------------------------------------------------------------
@@ -467,7 +474,8 @@ def _by_tangents(run: _Run) -> _Seen:
     taken = float(spread.largest("steps")[0])
     fewer = min(max(run.steps * share / max(taken, 1.0), 0.25), 1.0)
     level = epsilon * SAFETY * math.sqrt(fewer)
-    units = {"position": scaling.length, "velocity": scaling.speed} if "x" in system.states else {}
+    length, speed = (0, 0) if system.flown is None else system.flown_units()
+    units = {} if system.flown is None else {"position": length, "velocity": speed}
     sizes = {"rates": level, **{name: level * math.ldexp(PATH, unit) for name, unit in units.items()}}
     if run.carried:
         sizes["attitude"] = level
@@ -476,8 +484,8 @@ def _by_tangents(run: _Run) -> _Seen:
     found = _Seen(
         np.ldexp(spread.along("time") - start, scaling.time),
         {name: size * spread.along(name) for name, size in sizes.items()},
-        math.ldexp(float(spread.largest("distance")[0]), scaling.length),
-        math.ldexp(float(spread.largest("speed")[0]), scaling.speed),
+        math.ldexp(float(spread.largest("distance")[0]), length),
+        math.ldexp(float(spread.largest("speed")[0]), speed),
         stable_law(prepared.law_tolerance, steps, run.turned, 1.0),
         whole=bool(spread.whole[0]),
         share=share,
@@ -710,7 +718,7 @@ class MemberEstimates:
         if len(some):
             found[:, some] = self._errors(block, some)
         attitude, rates, position, velocity = found
-        flies = "x" in self._system.states
+        flies = self._system.flown is not None
         carried = self._measures.carried
         return MemberErrors(
             attitude if carried else None, rates, position if flies else None, velocity if flies else None
@@ -755,7 +763,8 @@ class MemberEstimates:
             moved = last * extent + np.ldexp(label, -units) * fastest
             position = path * at_end("position", moved, AS_LARGE * extent)
             velocity = path * at_end("velocity", last * fastest, AS_LARGE * fastest)
-        length, speed = (family.whole_numbers(e)[places] for e in (scaling.length, scaling.speed))
+        flown = (0, 0) if system.flown is None else system.flown_units()
+        length, speed = (family.whole_numbers(e)[places] for e in flown)
         return np.array([attitude, rates, np.ldexp(position, length), np.ldexp(velocity, speed)])
 
     def _compared(self, block: BatchBlock, some: np.ndarray, starts: Starts) -> Spread:

@@ -18,7 +18,7 @@ from typing import Any
 import heyoka as hy
 
 import rigidsim.model.observables.mechanical  # noqa: F401  (enters what it defines into the registry)
-from rigidsim.errors import ConfigError, Problem, ensure
+from rigidsim.errors import ConfigError, Problem, ensure, required
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.kinematics import Poles
 from rigidsim.model.load import Load
@@ -30,7 +30,7 @@ from rigidsim.model.orbits import Pieces, PieceSeries, TablePieces
 from rigidsim.model.own_states import own_blocks, refuse_taken_names
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
-from rigidsim.model.state_blocks import BODY, StateBlock, joined
+from rigidsim.model.state_blocks import BODY, RotatingBody, StateBlock, joined
 from rigidsim.model.step_limiter import pace_block
 from rigidsim.model.tangents import GROWTH, tangent_block
 from rigidsim.scene.expressions.names import EULER_NAMES
@@ -323,6 +323,18 @@ class System:
         """(what, why) for groups of states that aren't carried."""
         work = [("work of the loads", f"{name}: {why}") for name, why in self.unwatched.items()]
         return [*self.requirements.left_out, *work]
+
+    @cached_property
+    def flown(self) -> RotatingBody | None:
+        """Whose place and velocity are states: the body in flight, or a second body; None for neither."""
+        others = (RotatingBody(f"{table.name}_") for table in self.scene.config.rigid_bodies)
+        return next((one for one in (BODY, *others) if one.position[0] in self.states), None)
+
+    def flown_units(self) -> tuple[Any, Any]:
+        """Binary exponents of the units of that place and velocity."""
+        names = required(self.flown)
+        place, velocity = (self.states.index(x[0]) for x in (names.position, names.velocity))
+        return self.state_exponents[place], self.state_exponents[velocity]
 
     @property
     def angle_states(self) -> tuple[int, ...]:

@@ -23,6 +23,7 @@ import numpy as np
 
 from rigidsim.model.names import TANGENT
 from rigidsim.model.observables.mechanical import WORK
+from rigidsim.model.state_blocks import BODY
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import compiled_function, evaluate_rows
 from rigidsim.solve.lanes import BatchEngine
@@ -425,11 +426,6 @@ class ErrorTangents:
 
 # --- what they amount to ----------------------------------------------------------------------------------
 
-_GROUPS = {
-    "rates": ("wx", "wy", "wz"),
-    "position": ("x", "y", "z"),
-    "velocity": ("vx", "vy", "vz"),
-}
 _IDLE = ("pace", "work", "stride")
 """States that nothing depends on."""
 
@@ -454,7 +450,8 @@ class Measures:
     """Sizes of differences between a system's states.
 
     Attributes:
-        places: indices of the states of each quantity ("rates", "attitude", "position", "velocity").
+        places: indices of the states of each quantity ("rates", "attitude", "position", "velocity", and a
+            second body's attitude, "partner").
         felt: mask of the states that anything depends on, (states,).
         carried: whether there is an attitude.
         angles, turn: indices of the states that are angles growing without bound, and their full turn.
@@ -462,7 +459,11 @@ class Measures:
 
     def __init__(self, system: System, states: int | None = None, parameters: Sequence[Any] = ()) -> None:
         names, attitude = list(system.states[:states]), system.mechanics.attitude
-        self.places = {group: [names.index(n) for n in of if n in names] for group, of in _GROUPS.items()}
+        flown, groups = system.flown, {"rates": BODY.rates}
+        if flown is not None:
+            groups |= {"position": flown.position, "velocity": flown.velocity}
+            groups |= {} if flown is BODY else {"partner": flown.quaternion}
+        self.places = {group: [names.index(n) for n in of if n in names] for group, of in groups.items()}
         self.places["attitude"] = [] if attitude is None else [names.index(n) for n in attitude.names]
         self.felt = np.array([n not in _IDLE and not n.startswith(TANGENT) for n in names])
         self.carried = attitude is not None
@@ -492,8 +493,11 @@ class Measures:
         if self.carried:
             angles = self._angles_between(states, apart, starts.parameters[:, which])
             found["attitude"] = np.sqrt((angles**2).mean(axis=1)) / unit
+            if other := places.get("partner"):  # whose attitude may be the worse one
+                angle = 2.0 * np.sqrt((wrong[other] ** 2).sum(axis=0))
+                found["attitude"] = np.maximum(found["attitude"], angle)
         for name, size_name in (("position", "distance"), ("velocity", "speed")):
-            if place := places[name]:
+            if place := places.get(name):
                 found[name], found[size_name] = (
                     np.sqrt((x[place] ** 2).sum(axis=0)) for x in (wrong, states)
                 )

@@ -11,7 +11,17 @@ import numpy as np
 import pytest
 from equations import Random, derivative, matrix, observed
 from scipy.interpolate import make_interp_spline
-from support import config, loaded, matrices, run_text, same_bits, seeds, wide
+from support import (
+    angle_between,
+    assert_announced,
+    config,
+    loaded,
+    matrices,
+    run_text,
+    same_bits,
+    seeds,
+    wide,
+)
 
 import rigidsim
 from rigidsim.look.stages.registry import build_picture
@@ -475,3 +485,25 @@ def test_bodies_within_each_other_are_refused() -> None:
     text = didymos(DIMORPHOS.replace("1190", "370") + "angular_velocity = [0, 0, 0]")
     with pytest.raises(rigidsim.ConfigError, match="places the bodies into each other"):
         prepare(rigidsim.parse(text))
+
+
+@pytest.mark.slow
+def test_announced_errors_are_those_of_both_bodies() -> None:
+    """Attitude of the worse body and place of the second, against 80-bit arithmetic."""
+    announced, true = [], []
+    for speed in (0.1665, 0.168, 0.17, 0.1714, 0.173):
+        start = f"velocity = [0, {speed}, 0.001]\nangular_velocity = [0, 1e-7, 1.46e-4]"
+        text = didymos(DIMORPHOS + start, load="degree = 2", time="end = 6e5\nsamples = 61", estimate=True)
+        run = run_text(text, "output.estimate=true")
+        own, better = loaded(run), loaded(run_text(text, "integrator.precision='extended'"))
+        accuracy = run.summary["accuracy"]
+        apart = np.abs(own["rigid_body_position"].values - better["rigid_body_position"].values)[:, 0]
+        turned = [
+            angle_between(own[name].values.reshape(-1, 4), better[name].values.reshape(-1, 4)).max()
+            for name in ("quaternion", "rigid_body_quaternion")
+        ]
+        announced += [accuracy["estimated_attitude_error"], accuracy["estimated_position_error"]]
+        true += [max(turned), np.linalg.norm(apart, axis=1).max()]
+    print(np.array(announced) / true)
+    assert_announced(announced[::2], true[::2])
+    assert_announced(announced[1::2], true[1::2])
