@@ -271,6 +271,14 @@ def compare(
             "Known parts of the file's convention, such as order=xyzw,rate_axes=space.",
         ),
     ] = None,
+    offset: Annotated[
+        str | None,
+        options.option(
+            "--offset",
+            "TIME",
+            'Added to the file\'s times: 12.5, "3 min", first (its first row is at the start), or estimate.',
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         options.option("--out", "FILE", "Dataset of errors and defects along time, such as comparison.h5."),

@@ -10,18 +10,28 @@ import itertools
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from datetime import date
+from decimal import Decimal
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
-from rigidsim.errors import RigidsimError
+from rigidsim.errors import RigidsimError, ensure
 from rigidsim.formats.messages import MESSAGE_COLUMNS, message_columns
-from rigidsim.scene.epochs import Epoch, parse_epoch
+from rigidsim.scene.epochs import DIGITS, Epoch, parse_epoch
 from rigidsim.scene.row_rotations import conjugated, multiplied, turned
 from rigidsim.scene.space_axes import ECLIPTIC, SpaceAxes, from_equator
-from rigidsim.scene.text_tables import TableError, TextTable, holds_times, is_date, name_and_unit, open_table
+from rigidsim.scene.text_tables import (
+    TableError,
+    TextTable,
+    holds_times,
+    is_date,
+    name_and_unit,
+    open_table,
+)
 from rigidsim.scene.units import is_unit
 from rigidsim.scene.validation_messages import nearest
 
@@ -30,15 +40,26 @@ if TYPE_CHECKING:
     import xarray
 
 KINDS = (
-    "CSV (.csv, .txt, .dat, .tsv), Parquet, netCDF or HDF5 that xarray reads (.nc, .h5, .zarr), AEM, CK (.bc)"
+    "CSV (.csv, .txt, .dat, .tsv), Parquet, NumPy (.npz), netCDF or HDF5 that xarray reads (.nc, .h5, "
+    ".zarr), AEM, CK (.bc), the qbn.42 of 42"
 )
 KNOWN_AXES = frozenset(get_args(SpaceAxes))
 """Space axes whose turns to each other are known."""
-TEXT = {".csv", ".txt", ".dat", ".tsv"}
+TEXT = {".csv", ".txt", ".dat", ".tsv", ".tum"}
 """Endings of the names of text files."""
 _XARRAY = {".nc", ".nc4", ".cdf", ".h5", ".hdf5", ".zarr"}
 _MOST_COLUMNS = 500
+_NORM = 0.05  # by which quaternions of a table without names may differ from norm 1
 _BLOCK = 65_536  # rows of a text that are held as words
+_UNNAMED = {8: "timestamp tx ty tz qx qy qz qw"}
+"""Columns of tables without names, by their number: TUM's."""
+_OF_42 = {"time": ("time",), "qbn": ("qx", "qy", "qz", "qw"), "wbn": ("wx", "wy", "wz"),
+          "PosN": ("x", "y", "z"), "VelN": ("vx", "vy", "vz")}  # fmt: skip
+"""Files of the simulator 42 that lie in one folder, with what they hold; the first two are needed."""
+_UNIX = {"s": Fraction(1), "ms": Fraction(1, 10**3), "us": Fraction(1, 10**6), "ns": Fraction(1, 10**9)}
+_UNIX_RANGE = 1e9, 4.2e9  # s: 2001 to 2103
+_UNIX_BEGIN = date(1970, 1, 1).toordinal()
+_TICKS = 10**DIGITS
 
 
 @dataclass(frozen=True)
@@ -59,6 +80,7 @@ class Trajectory:
         notes: what a user should know of how the file was read.
         lines: numbers of the rows as the file counts them; None: from 0.
         text: the text that the columns are from; cells that are no numbers are read there again.
+        exact: whole numbers of columns that doubles can't hold.
     """
 
     columns: Mapping[str, np.ndarray]
@@ -74,6 +96,7 @@ class Trajectory:
     notes: tuple[str, ...] = ()
     lines: np.ndarray | None = None
     text: TextTable | None = None
+    exact: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def row(self, index: int) -> str:
         """A row as the file counts it."""
@@ -138,8 +161,30 @@ class Trajectory:
             )
         return found
 
+    @property
+    def timed(self) -> str:
+        """The column of times, a message's own stamp before others; empty without one."""
+        found = sorted(filter(holds_times, self.columns), key=lambda name: not name.endswith("stamp"))
+        known = (name for name in found if (unit := self.unit(name)) is None or is_unit(unit))
+        return next(known, next(iter(found), ""))
+
+    def _of_unix(self, name: str) -> list[Epoch] | None:
+        """Dates of seconds, or parts of them, since 1970; None of other numbers."""
+        values, unit = self.columns[name], self.unit(name)
+        low, high = (np.min(values, initial=np.inf), np.max(values, initial=-np.inf))
+        sizes = (size for one, size in _UNIX.items() if unit in (None, one))
+        fits = (x for x in sizes if _UNIX_RANGE[0] <= low * float(x) and high * float(x) < _UNIX_RANGE[1])
+        if (size := next(fits, None)) is None:
+            return None
+        numbers: Iterable[Any] = self.exact.get(name, values)
+        if self.text is not None and name in self.text.names:
+            numbers = (Decimal(self.text.plain(cell)) for _, cell in self.text.column(name))
+        ticks = (round(Fraction(x if isinstance(x, Decimal) else x.item()) * size * _TICKS) for x in numbers)
+        days = (divmod(x, 86400 * _TICKS) for x in ticks)
+        return [Epoch("UTC", _UNIX_BEGIN + day, rest) for day, rest in days]
+
     def dates(self, name: str, scale: str) -> list[Epoch] | None:
-        """Dates of a message, or of a column in a time scale; None if it holds numbers.
+        """Dates of a message, or of a column in a time scale; None if it holds numbers, but for Unix time.
 
         Raises:
             RigidsimError: there is no such column, or a row holds no date.
@@ -147,9 +192,9 @@ class Trajectory:
         if self.epochs:
             return list(self.epochs)
         name = self.named(name)
-        if self.text is None or name in self.columns:
-            return None
-        if not any(is_date(cell) for _, cell in self.text.column(name)):
+        if name in self.columns:
+            return self._of_unix(name)
+        if self.text is None or not any(is_date(cell) for _, cell in self.text.column(name)):
             return None
         found = []
         for number, cell in self.text.column(name):
@@ -160,11 +205,14 @@ class Trajectory:
         return found
 
     def dated(self) -> Trajectory:
-        """With the dates of a column of times, read as UTC; the same if times are numbers."""
-        timed = list(filter(holds_times, self.names))
-        if self.text is None or any(name in self.columns for name in timed):
-            return self
-        for name in timed:
+        """With the dates of a column of times, read as UTC, or of Unix time; the same if times are others."""
+        if name := self.timed:
+            if (unix := self._of_unix(name)) is None:
+                return self
+            columns = {one: values for one, values in self.columns.items() if one != name}
+            notes = (*self.notes, "times were read as Unix time (UTC)")
+            return replace(self, columns=columns, epochs=tuple(unix), notes=notes)
+        for name in filter(holds_times, self.names):
             if (dates := self.dates(name, "UTC")) is not None:
                 left_out = tuple(one for one in self.left_out if one != name)
                 notes = ("dates were read as UTC",)
@@ -196,7 +244,7 @@ def is_trajectory(path: Path) -> bool:
     suffix = path.suffix.lower()
     if suffix in _XARRAY:
         return not (path.parent / "dataset.h5").exists()
-    return suffix in {*TEXT, ".parquet", ".pq", ".aem", ".apm", ".oem", ".xml"}
+    return suffix in {*TEXT, ".npz", ".42", ".parquet", ".pq", ".aem", ".apm", ".oem", ".xml"}
 
 
 def read_columns(path: Path) -> Trajectory:
@@ -208,9 +256,11 @@ def read_columns(path: Path) -> Trajectory:
     if not path.exists():
         raise RigidsimError(f"{path}: there is no such file; allowed: {KINDS}")
     suffix = path.suffix.lower()
-    if suffix in (*_XARRAY, ".parquet", ".pq"):
+    if suffix in (*_XARRAY, ".parquet", ".pq", ".npz"):
         try:
-            return _of_xarray_file(path) if suffix in _XARRAY else _of_parquet(path)
+            return {".parquet": _of_parquet, ".pq": _of_parquet, ".npz": _of_numpy}.get(
+                suffix, _of_xarray_file
+            )(path)
         except (RigidsimError, MemoryError):
             raise
         except Exception as error:  # readers of other packages raise many kinds on files of other contents
@@ -221,6 +271,8 @@ def read_columns(path: Path) -> Trajectory:
                 head = file.read(4096)
             if (found := re.search(r"CCSDS_(AEM|APM|OEM)_VERS", head)) is not None:
                 return Trajectory(source=str(path), **message_columns(path, found[1]))
+            if suffix == ".42":
+                return _of_42(path)
             if suffix in TEXT:
                 return _of_text(path)
     except TableError as error:
@@ -231,8 +283,9 @@ def read_columns(path: Path) -> Trajectory:
 
 
 def read_trajectory(path: Path) -> Trajectory:
-    """The same, with dates where a text has them in place of times."""
-    return read_columns(path).dated()
+    """The same, with dates where the file has them, or Unix time, in place of times."""
+    found = read_columns(path)
+    return found if path.suffix.lower() in _XARRAY else found.dated()
 
 
 def _unreadable(path: Path, error: Exception) -> RigidsimError:
@@ -248,13 +301,13 @@ def trajectory_of(table: Any, source: str = "the table") -> Trajectory:
     if hasattr(table, "data_vars"):
         return _of_dataset(table, source)
     if hasattr(table, "itertuples"):
-        return _of_frame(table, source)
+        return _of_frame(table, source).dated()
     if not isinstance(table, Mapping):
         raise RigidsimError(
             f"given {type(table).__name__}; a path, a mapping of names to arrays, a pandas DataFrame or an "
             "xarray Dataset is allowed"
         )
-    return _made(((str(name), np.asarray(value), ()) for name, value in table.items()), source)
+    return _made(((str(name), np.asarray(value), ()) for name, value in table.items()), source).dated()
 
 
 def _made(
@@ -264,6 +317,7 @@ def _made(
     (none: numbers from 0).
     """
     columns: dict[str, np.ndarray] = {}
+    exact: dict[str, np.ndarray] = {}
     left_out, narrow = [], False
     for name, value, labels in given:
         places = list(itertools.product(*map(range, value.shape[1:])))
@@ -273,6 +327,8 @@ def _made(
             left_out.append(name)
             continue
         narrow = narrow or value.dtype == np.float32
+        if value.dtype.kind in "iu" and value.ndim == 1:
+            exact[name] = np.asarray(value)
         table = np.asarray(value).reshape(len(value), -1).astype(np.float64)
         parts = labels or ["".join(map(str, place)) for place in places]
         for part, column in zip(parts, table.T, strict=True):
@@ -280,7 +336,7 @@ def _made(
     sizes = {len(column) for column in columns.values()}
     if len(sizes) > 1:
         raise RigidsimError(f"{source}: columns of different lengths ({sorted(sizes)[:5]}); give equal ones")
-    return Trajectory(columns, source, units or {}, narrow=narrow, left_out=tuple(left_out))
+    return Trajectory(columns, source, units or {}, narrow=narrow, left_out=tuple(left_out), exact=exact)
 
 
 def _of_frame(frame: pandas.DataFrame, source: str) -> Trajectory:
@@ -326,8 +382,32 @@ def _of_parquet(path: Path) -> Trajectory:
     return _of_frame(read_table(path).to_pandas(ignore_metadata=True), str(path))
 
 
+def _of_numpy(path: Path) -> Trajectory:
+    with np.load(path) as arrays:
+        return _made(((name, arrays[name], ()) for name in arrays.files), str(path))
+
+
+def _of_42(path: Path) -> Trajectory:
+    """Files of one run of the simulator 42, of which the one with the quaternions is given."""
+    what = f"{path}: of a run of 42 the file of quaternions, qbn.42, is read, with those next to it"
+    ensure(path.stem == "qbn", RigidsimError(f"{what}; give that one"))
+    columns: dict[str, np.ndarray] = {}
+    for stem, names in _OF_42.items():
+        beside = path.with_name(f"{stem}.42")
+        if not beside.is_file() and stem not in ("time", "qbn"):
+            continue
+        what = f"{path}: needs {beside.name} next to it, in which 42 writes the {stem}; copy it there"
+        ensure(beside.is_file(), RigidsimError(what))
+        table = open_table(partial(_lines, beside), usual={len(names): " ".join(names)})
+        rows = np.array([list(map(table.number, cells)) for _, cells in table.rows()])
+        what = f"{beside}: has {len(rows)} rows, where time.42 has {len(columns.get('time', rows))}"
+        ensure(len(rows) == len(columns.get("time", rows)), RigidsimError(f"{what}; write both again"))
+        columns |= dict(zip(names, rows.T, strict=True))
+    return Trajectory(columns, str(path), counted="row")
+
+
 def _of_text(path: Path) -> Trajectory:
-    table = open_table(partial(_lines, path))
+    table = open_table(partial(_lines, path), usual=_UNNAMED)
     lines: list[int] = []
     rows, blocks = table.rows(), []
     while block := list(itertools.islice(rows, _BLOCK)):
@@ -336,6 +416,12 @@ def _of_text(path: Path) -> Trajectory:
     if not lines:
         raise TableError("no rows; a line of names and rows of values are needed")
     found = dict(zip(table.names, np.concatenate(blocks).T, strict=True))
+    if table.names == _UNNAMED[8].split() and not table.head:
+        norms = np.linalg.norm(np.stack([found[name] for name in table.names[4:]]), axis=0)
+        if not abs(np.nanmedian(norms) - 1) < _NORM:
+            raise TableError(
+                "line 1 holds numbers; put a line of names above, such as t,qw,qx,qy,qz,wx,wy,wz"
+            )
     kept = {name: values for name, values in found.items() if np.isfinite(values).any()}
     left_out = tuple(name for name in found if name not in kept)
     return Trajectory(

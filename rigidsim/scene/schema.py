@@ -548,15 +548,19 @@ class FitDataTable(ConfigTable):
     """``[[fit.data]]``: one set of observations with times."""
 
     file: StrictStr = Field(examples=["observed.csv"])
-    """CSV, Parquet, netCDF, AEM, OEM, CK, or the dataset of a run; its path from the config's folder"""
+    """CSV, Parquet, NumPy, netCDF, AEM, APM, OEM, CK, or the dataset of a run; its path from the config's
+    folder
+    """
     kernels: EachOnce[StrictStr] = Field(default_factory=list, examples=[["clock.tsc", "leapseconds.tls"]])
     """of a CK: the clock (SCLK) and other kernels that SPICE needs; paths from the config's folder"""
     time: StrictStr = Field("time", examples=["time", "utc"])
-    """column of the times: seconds of the run, or dates"""
+    """column of the times: seconds of the run, dates, or Unix time"""
     observable: StrictStr = Field(examples=["quaternion", "angular_velocity", "wz^2"])
     """any variable that can be recorded, or an expression as in [[events]]"""
     columns: EachOnce[StrictStr] | None = Field(None, examples=[["alpha_deg", "beta_deg", "gamma_deg"]])
-    """columns of its components; by default NAME_COMPONENT as in exported tables, or NAME for a single one"""
+    """columns of its components; by default NAME_COMPONENT as in exported tables, or NAME for a single one,
+    or what tools write
+    """
     unit: StrictStr | None = Field(None, examples=["deg"])
     """unit of these columns; by default the file's, or SI"""
     sigma: Any = Field(examples=["5 deg", "sigma_deg", 1e-3])
@@ -565,6 +569,8 @@ class FitDataTable(ConfigTable):
     """
     scale: Literal["TDB", "TT", "TAI", "GPS", "UTC"] = "UTC"
     """time scale of dates that don't name theirs"""
+    offset: Second = Field(ZERO, examples=["37 s"])
+    """added to the times"""
     outliers: Annotated[Dimensionless, _ONE_OR_MORE] | None = Field(None, examples=[4])
     """leave out and report rows with a residual above so many standard deviations; by default none"""
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -21,8 +21,12 @@ from rigidsim.scene.epochs import A_DATE, Epoch, parse_epoch
 from rigidsim.scene.exact import parse_number
 from rigidsim.scene.units import is_unit
 
-TIMES = ("t", "time", "times", "epoch", "seconds", "timestamp", "date", "datetime", "utc")
+TIMES = (
+    "t", "time", "times", "epoch", "seconds", "timestamp", "timestamps", "date", "datetime", "utc", "stamp",
+    "sim_time", "simtime",
+)  # fmt: skip
 """Names of columns of times or dates, without their units."""
+NO_NAMES = "line {} holds numbers; put a line of names above, such as t,qw,qx,qy,qz,wx,wy,wz"
 _BRACKETS = re.compile(r"(.*?[A-Za-z]\w*)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*")
 _OF_TIMES = re.compile(r"(t|time|timestamp)_([a-z]+)", re.I)
 _ENDINGS = {"deg_s": "deg/s", "degs": "deg/s", "rad_s": "rad/s", "rads": "rad/s", "deg": "deg",
@@ -103,12 +107,15 @@ class TextTable:
         }  # fmt: skip
 
 
-def open_table(lines: Callable[[], Iterable[str]], unnamed: str = "") -> TextTable:
+def open_table(
+    lines: Callable[[], Iterable[str]], unnamed: str = "", usual: Mapping[int, str] | None = None
+) -> TextTable:
     """Find the names and the separator of a text.
 
     Args:
         lines: gives its lines, from the first one.
         unnamed: name of the first column of a table without names; empty if such tables are refused.
+        usual: names of all columns of a table without names, by their number.
 
     Raises:
         TableError: it is empty, or names no columns.
@@ -127,12 +134,12 @@ def open_table(lines: Callable[[], Iterable[str]], unnamed: str = "") -> TextTab
             for one in (above, separator):
                 if len(names) == len(_cells(text, one)) and all(map(_is_name, names)):
                     return TextTable(lines, names, one, number - 1)
+        if (named := (usual or {}).get(len(_cells(text, separator)))) is not None:
+            return TextTable(lines, named.split(), separator, number - 1)
         if unnamed:
             names = [unnamed, *(f"column {n}" for n in range(2, len(_cells(text, separator)) + 1))]
             return TextTable(lines, names, separator, number - 1)
-        raise TableError(
-            f"line {number} holds numbers; put a line of names above, such as t,qw,qx,qy,qz,wx,wy,wz"
-        )
+        raise TableError(NO_NAMES.format(number))
     raise TableError("empty; a line of names and rows of numbers are needed")
 
 
@@ -176,7 +183,8 @@ def name_and_unit(name: str) -> tuple[str, str | None]:
 
 def holds_times(name: str) -> bool:
     """Whether a column of this name, with a unit or without, holds times or dates."""
-    return name_and_unit(name)[0].lower() in TIMES
+    bare = re.sub(r"[^a-z0-9]+", "_", name_and_unit(name)[0].lower()).strip("_")
+    return bare in TIMES or bare.endswith("header_stamp")
 
 
 def is_date(cell: str) -> bool:

@@ -48,7 +48,7 @@ QUICK = {
     "compare free.toml runs/free --set time.end=2 --within 1e-8 --out seen.h5 --figure seen.png --json": 0,
     "compare free.toml runs/free --set time.end=2 --timeline both.rrd --convention order=wxyz --force": 0,
     "tradeoff free.toml --with runs/free,long": 2,
-    "compare free.toml runs/free --convention order=xwyz": 2,
+    "compare free.toml runs/free --convention order=xwyz --offset first": 2,
     "compare free.toml missing.bc --kernels missing.tsc": 2,
     "fit watched.toml --out fits --set time.end=3 --write watched_again.toml --force --json": 0,
     "fit nights.toml --member 1 --out fits": 0,

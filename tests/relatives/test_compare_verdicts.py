@@ -54,12 +54,12 @@ def test_the_order_of_columns_is_said() -> None:
     assert rigidsim.compare(rigidsim.parse(SPIN), spinning(-0.03, 14.0)).convention.order == "xyzw"
 
 
-@pytest.mark.parametrize("zero", [1.7e9, 1.7e12, -1e9])
+@pytest.mark.parametrize("zero", [7e8, 1.7e13, -1e9])
 def test_times_counted_from_another_zero_are_refused_with_the_shift(zero: float) -> None:
     table = spinning(-0.03, 14.0)
     table["t"] = table["t"] + zero
     with pytest.raises(
-        RigidsimError, match=rf"another zero .*subtract {zero:.15g} from each time".replace("+", r"\+")
+        RigidsimError, match=rf"another zero; subtract {zero:.15g} from each time".replace("+", r"\+")
     ):
         rigidsim.compare(rigidsim.parse(SPIN), table)
 

@@ -27,6 +27,7 @@ from rigidsim.workflows.compare.conventions import (
 )
 from rigidsim.workflows.compare.defects import rms
 from rigidsim.workflows.compare.evidence import Evidence, judged
+from rigidsim.workflows.compare.offsets import shifted
 from rigidsim.workflows.read import Given, as_experiment
 from rigidsim.workflows.run import Sampled, sampled
 
@@ -181,6 +182,7 @@ def compare(
     *,
     within: float = WITHIN,
     convention: Mapping[str, str] | None = None,
+    offset: str | float | None = None,
     out: str | Path | None = None,
     figure: str | Path | None = None,
     timeline: str | Path | None = None,
@@ -196,6 +198,8 @@ def compare(
         within: largest angle between attitudes that agree, rad.
         convention: known parts of the file's convention, such as ``{"order": "xyzw", "rate_axes": "space"}``;
             the rest is found.
+        offset: added to the file's times: s, a text with a unit, "first" (its first row is at the
+            experiment's start) or "estimate".
         out: file for the dataset. figure: file for the figure, a .png or .svg.
         timeline: file for a timeline (.rrd) of both bodies with the angle between them.
         kernels: of SPICE, for reading a CK: clock and leap seconds.
@@ -214,6 +218,13 @@ def compare(
     given = attitudes_of(trajectory_given(table, scene, kernels), scene.epoch)
     if not 0 < within < np.pi:
         raise RigidsimError(f"within: given {within:g}; an angle above 0 and below pi, in rad, is allowed")
+    span = float(scene.start), float(scene.samples.last)
+
+    def motion_at(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        made = _own_motion(quiet, times, []).dataset
+        return made["quaternion"].values, made["angular_velocity"].values
+
+    given = shifted(given, offset, span, motion_at, convention or {})
     _refuse_far(given, scene)
     notes = list(given.notes)
     if given.time_unit is None:
@@ -256,9 +267,9 @@ def _refuse_far(given: Attitudes, scene: Scene) -> None:
     raise RigidsimError(
         f"{given.trajectory.source}: its times, {first / second:.15g} to {last / second:.15g} {unit}, lie "
         f"far {'behind' if first > begin else 'before'} the experiment ({begin:.6g} to {end:.6g} s), as if "
-        f"counted from another zero (Unix seconds?); subtract {(first - begin) / second:.15g} from each "
-        "time, if its first row is the experiment's start; or write dates, and give [time] epoch; or move "
-        "[time] start"
+        f"counted from another zero; subtract {(first - begin) / second:.15g} from each time (offset "
+        '"first"), if its first row is the experiment\'s start; or write dates, and give [time] epoch; or '
+        "move [time] start"
     )
 
 

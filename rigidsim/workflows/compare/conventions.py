@@ -11,7 +11,6 @@ the mean of the rates at both, up to (rate x interval)^2 / 12 of it, whatever ac
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -20,6 +19,16 @@ from typing import Any
 import numpy as np
 
 from rigidsim.errors import RigidsimError
+from rigidsim.formats.columns import (
+    ANGLES,
+    ATTITUDES,
+    MATRIX,
+    MRP,
+    QUATERNION,
+    VECTOR,
+    columns_of,
+    quaternions_from,
+)
 from rigidsim.formats.digits import FEW, written_resolution
 from rigidsim.formats.trajectories import Trajectory
 from rigidsim.scene.epochs import Epoch
@@ -35,34 +44,11 @@ from rigidsim.scene.row_rotations import (
     turned,
     vector_of,
 )
-from rigidsim.scene.text_tables import holds_times, name_and_unit
-from rigidsim.scene.units import is_unit
 
 LEAST_ROWS = 3
-QUATERNION, MATRIX, ANGLES = "quaternion", "matrix", "angles"
 _NORM = 1e-3  # that the median norm of quaternions may differ from one without a note
 _DAMAGED = 0.05  # that a norm may differ from those around it; integrators let it drift, and more slowly
 _GAP = 1000.0  # times the median spacing, from which on a gap is noted
-_Q = r"(?:quaternion|quat|attitude|q)_?"
-_MATRIX = r"(?:rotation_?matrix|matrix|dcm|rot|r|m|c|a)_?"
-_EULER = r"(?:euler_?angles?|euler|angles?|ang|e|a)_?"
-_RATE = r"(?:angular_?velocity|angular_?rate|angvel|body_?rate|omega|gyro|rate|om|w)_?"
-_POSITION = r"(?:position|pos|r|p)?_?"
-_VELOCITY = r"(?:velocity|vel|v)_?"
-_PAIRS = [[f"{i}_?{j}" for i in digits for j in digits] for digits in ("123", "012", "xyz")]
-_VECTORS = ("xyz", "123", "012")
-_ANGLE_NAMES = [("phi", "theta", "psi"), ("roll", "pitch", "yaw"), ("alpha", "beta", "gamma"),
-                ("precession", "nutation", "spin"), ("heading", "pitch", "roll")]  # fmt: skip
-_SUFFIX = r"(?:_(?:deg|rad|deg_s|rad_s|degs|rads|rpm|m|s|m_s|body|b))?"
-_FORMS: dict[str, list[tuple[str, Sequence[str]]]] = {
-    QUATERNION: [(_Q, "wxyz"), ("", "wxyz"), (_Q, "0123"), (_Q, "1234")],
-    MATRIX: [(_MATRIX, pairs) for pairs in _PAIRS],
-    ANGLES: [*((f"(?:{_EULER})?", n) for n in _ANGLE_NAMES), (_EULER, "123"), (_EULER, "012")],
-    "rates": [*((_RATE, letters) for letters in _VECTORS), ("", "pqr")],
-    "positions": [(_POSITION, letters) for letters in _VECTORS],
-    "velocities": [(_VELOCITY, letters) for letters in _VECTORS],
-}
-"""Stems and components of the names of columns, the surest ones first."""
 
 
 @dataclass(frozen=True)
@@ -120,26 +106,31 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
             f"{found.source}: {rows} rows; at least {LEAST_ROWS} are needed: sample more often{without}"
         )
     found = found.at(slice(None))  # with numbers of its rows
-    plain = {_plain(name): name for name in found.columns}
-    columns: dict[str, list[str]] = {}
-    for kind, forms in _FORMS.items():
-        if kind in (MATRIX, ANGLES) and (QUATERNION in columns or MATRIX in columns):
-            continue
-        names = next(filter(None, (_components(plain, *form) for form in forms)), [])
-        if names and not {*names} & {name for known in columns.values() for name in known}:
-            columns[kind] = names
-    kind = next((kind for kind in (QUATERNION, MATRIX, ANGLES) if kind in columns), "")
+    try:
+        known = columns_of(found.columns)
+    except ValueError as error:
+        raise RigidsimError(f"{found.source}: {error}{without}") from None
+    columns = {kind: one.names for kind, one in known.items()}
+    kind = next((kind for kind in ATTITUDES if kind in columns), "")
     if not kind:
         raise RigidsimError(
             f"{found.source}: no attitude among its columns ({shown}), which all of a comparison is about; "
             f"name it qw qx qy qz, q0 q1 q2 q3, r11 ... r33, or euler_1 euler_2 euler_3{without}"
         )
     taken = {name: np.stack([found.column(one) for one in names], axis=1) for name, names in columns.items()}
-    letters = "".join(re.sub(_SUFFIX + "$", "", _plain(name))[-1:] for name in columns[kind])
     places = np.argsort([list(found.columns).index(name) for name in columns[kind]])
-    order = "".join(letters[n] for n in places) if letters == "wxyz" else ""
+    order = "".join(known[kind].letters[n] for n in places) if known[kind].letters else ""
     if kind == ANGLES or order:
         taken[kind] = taken[kind][:, places]  # as in the file
+    written, angle_unit = taken[kind], _unit(found, columns[kind], "rad")
+    last_digits = written_resolution(written, found.narrow, few=FEW)
+    if kind in (MRP, VECTOR):
+        size = size_of(angle_unit, "rad") if angle_unit and kind == VECTOR else 1.0
+        last_digits *= 2.0 if kind == MRP else size / 2  # of a small turn's quaternion
+        taken[QUATERNION] = quaternions_from(kind, taken.pop(kind) * size)
+        columns[QUATERNION], order, angle_unit = columns.pop(kind), "wxyz", None
+        notes.append(f"{kind} were read as quaternions")
+        kind = QUATERNION
     time_unit: str | None = "s"
     if found.epochs:
         if epoch is None:
@@ -147,12 +138,11 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
         zero = epoch or found.epochs[0]
         times = np.array([float(date.since(zero)) for date in found.epochs])
     else:
-        timed = list(filter(holds_times, found.columns))
-        if not timed:
+        name = found.timed
+        if not name:
             raise RigidsimError(
                 f"{found.source}: no time among its columns ({shown}); name it t or time{without}"
             )
-        name = next((x for x in timed if (unit := found.unit(x)) is None or is_unit(unit)), timed[0])
         columns["time"] = [name]
         time_unit = _unit(found, [name]) or ("s" if name.lower() == "seconds" else None)
         times = found.column(name)
@@ -163,33 +153,18 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
     notes += _refuse_rows(found, times, kind, taken[kind])
     second = _seconds_in(time_unit or "s", found.source)
     resolution = found.resolution or (
-        written_resolution(taken[kind], found.narrow, few=FEW),
+        last_digits,
         written_resolution(taken["rates"], found.narrow) if "rates" in taken else 0.0,
     )
     used = {name for names in columns.values() for name in names}
     others = {name: values for name, values in found.columns.items() if name not in used}
     by_times = second * written_resolution(times, found.narrow)
-    units = _unit(found, columns[kind], "rad"), _unit(found, columns.get("rates", ()), "rad/s")
+    units = angle_unit, _unit(found, columns.get("rates", ()), "rad/s")
     return Attitudes(
         replace(found, columns=others), times * second, time_unit, kind, taken[kind], order, units[0],
         taken.get("rates"), units[1], taken.get("positions"), taken.get("velocities"),
         (*resolution, by_times), notes,
     )  # fmt: skip
-
-
-def _plain(name: str) -> str:
-    """A name in small letters, without a unit in brackets."""
-    bare = name_and_unit(name)[0] if name.rstrip()[-1:] in ("]", ")") else name
-    return re.sub(r"[^a-z0-9]+", "_", bare.strip().lower()).strip("_")
-
-
-def _components(plain: dict[str, str], stem: str, parts: Sequence[str]) -> list[str]:
-    """Names of a stem with each of these components, in their order; none unless all are there."""
-    found = []
-    for part in parts:
-        form = re.compile(stem + part + _SUFFIX)
-        found.append(max(filter(form.fullmatch, plain), key=len, default=""))
-    return [plain[name] for name in found] if all(found) and len({*found}) == len(parts) else []
 
 
 def _unit(found: Trajectory, names: Sequence[str], expected: str = "") -> str | None:

@@ -18,8 +18,17 @@ from typing import Any, get_args
 
 import numpy as np
 
-from rigidsim.errors import ConfigError, Problem, RigidsimError
+from rigidsim.errors import ConfigError, Problem, RigidsimError, ensure
 from rigidsim.formats import ck_reading
+from rigidsim.formats.columns import (
+    MRP,
+    POSITIONS,
+    RATES,
+    VECTOR,
+    VELOCITIES,
+    columns_of,
+    quaternions_from,
+)
 from rigidsim.formats.messages import MESSAGE_COLUMNS
 from rigidsim.formats.trajectories import Trajectory, config_unit, read_columns
 from rigidsim.model.kinematics import Kinematics
@@ -49,6 +58,11 @@ _PREFIX = "fit_expression_"
 QUATERNION, EULER_ANGLES = "quaternion", "euler_angles"
 """Variables that are attitudes; what is computed of any is the former."""
 _ROTATIONS = (QUATERNION, EULER_ANGLES)
+_FORMS = {
+    QUATERNION: (QUATERNION, MRP, VECTOR), "angular_velocity": (RATES,), "position": (POSITIONS,),
+    "velocity": (VELOCITIES,),
+}  # fmt: skip
+"""Quantities of ``rigidsim.formats.columns`` that variables are, in order."""
 _STATES = ("attitude", "flight")
 _META = b"KPL/MK"
 _NORM = 1e-2  # by which the norm of a quaternion may differ from 1
@@ -244,7 +258,7 @@ class _Reader:
     def readings(self) -> Readings:
         self.found = found = self._opened()
         notes = [f"{self.table.file}: {note}" for note in found.notes]
-        times, values = self._times(), self._values()
+        times, values = self._times() + float(self.table.offset), self._values()
         sigmas = self._sigmas(len(times))
         kept = self._within(times, notes)
         order = kept[np.argsort(times[kept], kind="stable")]
@@ -283,6 +297,8 @@ class _Reader:
         """The rows of a file; of a CK, which holds dates, and attitudes relative to J2000, as it has them."""
         file, *kernels = self.files
         if not kernels and file.suffix.lower() != ck_reading.SUFFIX:
+            what = f"{self.table.file} is one of several files, of which a fit copies one; write one table"
+            ensure(file.suffix != ".42", self._fault("file", what))
             saved = file / "dataset.h5"  # where the file is the folder of a run
             return read_columns(saved if saved.is_file() else file).in_axes(self.scene.axes)
         if self.scene.epoch is None:
@@ -311,6 +327,8 @@ class _Reader:
 
     def _times(self) -> np.ndarray:
         name = self.table.time
+        if "time" not in self.table.model_fields_set and not self.found.has(name):
+            name = self.found.timed or name
         dates = self.found.dates(name, self.table.scale)
         if dates is None:
             return self.found.column(name) * self._size("time", self.found.unit(name) or "s", "s")
@@ -327,6 +345,11 @@ class _Reader:
             usual = list(MESSAGE_COLUMNS[quantity.variable])
             if quantity.variable != "angular_velocity":
                 self._check_axes()
+        kind = ""
+        if not (self.table.columns or all(map(found.has, usual)) or quantity.form == EULER_ANGLES):
+            kind, usual = self._recognised(usual)
+        if kind in (MRP, VECTOR):
+            return self._turns(kind, usual)
         names = self.table.columns or usual
         if len(names) != len(components):
             raise self._fault(
@@ -356,6 +379,33 @@ class _Reader:
                 "within 0.01 of 1 are allowed: mend or remove these rows"
             )
         return normalised(values)
+
+    def _recognised(self, usual: list[str]) -> tuple[str, list[str]]:
+        """What the columns of the quantity are, and their names; the usual ones if nothing is recognised."""
+        try:
+            known = columns_of(self.found.columns)
+        except ValueError as error:
+            raise RigidsimError(f"{self.found.source}: {error}, or name them in columns") from None
+        kind = next((one for one in _FORMS.get(self.quantity.variable, ()) if one in known), "")
+        if not kind:
+            return "", usual
+        names = known[kind].names
+        what = (
+            f"{self.found.source}: which of {', '.join(names)} is the scalar isn't said; name the columns w "
+        )
+        said = kind != QUATERNION or known[kind].letters
+        ensure(said, RigidsimError(f"{what}x y z in columns"))
+        return kind, names
+
+    def _turns(self, kind: str, names: list[str]) -> np.ndarray:
+        """Quaternions of attitudes in another form."""
+        units = {unit for name in names if (unit := self.found.unit(name)) is not None}
+        what = f"columns in several units ({', '.join(sorted(units))}); write all in one"
+        ensure(len(units) <= 1, self._fault("columns", what))
+        unit = self.table.unit or next(iter(units), "rad")
+        self.factor = 1.0 if kind == MRP else self._size("unit", unit, "rad")
+        values = np.stack([self.found.column(name) for name in names], axis=1)
+        return quaternions_from(kind, values * self.factor)
 
     def _check_axes(self) -> None:
         """Refuse what a message holds in other axes than the config's, or in none that are named."""
@@ -417,7 +467,7 @@ def _usable(sigma: Any) -> Any:
 
 # --- parameters ---------------------------------------------------------------------------------------------
 
-_FORMS = ("euler_angles", "pole", "prime_meridian", "obliquity", "node_longitude", "apm")
+_ATTITUDES = ("euler_angles", "pole", "prime_meridian", "obliquity", "node_longitude", "apm")
 
 
 @dataclass(frozen=True)
@@ -521,7 +571,7 @@ class FitKeys:
         initial = self.scene.config.initial
         given = np.array([float(x) for x in given_attitude(self.scene).quaternion])
         quaternion = multiplied(given[None, :], of_vector(turn[None, :]))[0]
-        texts = [f"initial.{name}=" for name in _FORMS if getattr(initial, name) is not None]
+        texts = [f"initial.{name}=" for name in _ATTITUDES if getattr(initial, name) is not None]
         if initial.spin_period is not None or initial.apm is not None:
             along = self.scene.angular_velocity
             if initial.spin_period is not None:
