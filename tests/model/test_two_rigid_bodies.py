@@ -400,11 +400,20 @@ def test_the_synchronous_equilibrium_of_didymos_is_found_to_all_digits() -> None
 def test_after_the_impact_the_mean_period_is_that_of_an_independent_program() -> None:
     """500 revolutions after a change of the relative velocity by -2.6 mm/s: 11.389939721 h."""
     start = "velocity = [0, 0.17140531587957162392, 0]\nangular_velocity = [0, 0, 1.46222954520648423e-4]"
-    time, record = "end = 2.06e7\nevery = 1500", 'record = ["orbit_angle", "yaw"]'
-    data = loaded(run_text(didymos(DIMORPHOS + start, time=time, output=record)))
+    time, record = "end = 2.06e7\nevery = 1500", 'record = ["orbit_angle", "yaw", "separation"]'
+    near = '\n[[events]]\nname = "near"\nexpression = "separation - 1125"\ndirection = "down"'
+    run = run_text(didymos(DIMORPHOS + start + near, time=time, output=record))
+    data = loaded(run)
+    distance = make_interp_spline(data["time"].values, data["separation"].values, k=7)
+    np.testing.assert_allclose(distance(data["near_time"].values), 1125, rtol=0, atol=1e-5)
+    assert data["near"].size > 100
     passed = make_interp_spline(data["orbit_angle"].values, data["time"].values, k=7)
     assert float(passed(1000 * np.pi)) / 500 / 3600 == pytest.approx(11.389939721, rel=1e-10)
     assert np.degrees(np.abs(data["yaw"]).max()) == pytest.approx(26.16, abs=0.02)
+    [yaw] = rigidsim.analyse(data, variables=["yaw"], lines=2).signals
+    for line, hours, degrees in zip(yaw.lines, (13.6956, 11.4935), (14.09, 11.48), strict=True):
+        assert 2 * np.pi / abs(float(line.frequency)) / 3600 == pytest.approx(hours, abs=6e-5)
+        assert np.degrees(float(line.amplitude)) == pytest.approx(degrees, abs=6e-3)
 
 
 @pytest.mark.parametrize("seed", seeds(1, 10))

@@ -12,6 +12,7 @@ over many turns gives the mean period.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 import heyoka as hy
@@ -19,6 +20,7 @@ import heyoka as hy
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.loads.rigid_bodies import SecondBody, second_body
 from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.names import in_si
 from rigidsim.model.observables.observable import (
     BODY,
     NEEDS,
@@ -37,7 +39,10 @@ from rigidsim.model.rotations import Symbolic, along, length, unit
 from rigidsim.model.rotations import apply as turned
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, norm
+from rigidsim.scene.expressions.names import NameProvider, Readable, provides
 from rigidsim.scene.frame import unique_axis
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.schema import Config
 
 NEEDS["rigid_bodies"] = Need(
     lambda m: second_body(m.scene) is not None and m.attitude is not None,
@@ -101,6 +106,29 @@ def _orbit_angle(m: Mechanics) -> list[Angle]:
 def _turns(m: Mechanics) -> bool:
     start = _second(m).start
     return any(x != 0 for x in cross(start.position, start.velocity))
+
+
+@provides
+class PairNames(NameProvider):
+    """The distance of both bodies."""
+
+    brings = "separation with [[rigid_bodies]]"
+
+    def names(self, config: Config) -> Iterable[Readable]:
+        """See ``NameProvider``."""
+        return [Readable("separation", "m")] if config.rigid_bodies else []
+
+    def at_start(self, scene: Scene) -> Mapping[str, Any]:
+        """See ``NameProvider``."""
+        second = second_body(scene)
+        return {} if second is None else {"separation": norm(scene.context, second.start.position)}
+
+    def expressions(self, m: Kinematics, names: Collection[str]) -> Mapping[str, Any]:
+        """See ``NameProvider``."""
+        second = second_body(m.scene) if "separation" in names else None
+        if second is None:
+            return {}
+        return {"separation": in_si(m, length(second.seen(m).place), second.units(m.scene)[0])}
 
 
 _no_turn = lacking(_turns, "both bodies are on a line and don't go round; leave it out, or")
