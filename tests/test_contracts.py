@@ -87,14 +87,25 @@ DAMPED = config(
     loads='kind = "viscous_torque"\ncoefficients = [0.01, 0.02, 0.03]',
     output='record = ["angular_velocity", "energy"]',
 )
+PAIR = config(
+    'shape = "cuboid"\nmass = 3e10\nsize = [0.6, 0.5, 0.4]',
+    "quaternion = [0.9, 0.28, -0.35, 0.2]\nangular_velocity = [0.3, 1.0, 0.5]",
+    [
+        'kind = "mutual_gravity"\ndegree = 4',
+        'kind = "viscous_torque"\ncoefficients = [1e6, 2e6, 3e6]',
+    ],
+    more='[[rigid_bodies]]\nname = "moon"\nshape = "cylinder"\nmass = 1e10\nradius = 0.2\nheight = 0.7\n'
+    "euler_angles = [0.3, 0.5, 0.2]\nangular_velocity = [0.2, -0.3, 0.6]\n"
+    "position = [2, 0.1, 0.3]\nvelocity = [0.1, 1.1, 0.2]\n",
+)
 SCENES = {
     name: text.replace("end = 3", "end = 12")
     for name, text in {
         "flight": FLIGHT, "satellite": SATELLITE, "spinner": SPINNER, "elastic": ELASTIC, "top": TOP,
-        "pendulum": PENDULUM, "damped": DAMPED,
+        "pendulum": PENDULUM, "damped": DAMPED, "pair": PAIR,
     }.items()
 }  # fmt: skip
-MAIN = ("flight", "satellite", "spinner", "elastic", "top")
+MAIN = ("flight", "satellite", "spinner", "elastic", "top", "pair")
 VARIED: dict[str, dict[str, list[Any]]] = {
     "flight": {"loads[0].gravitational_parameter": [0.9, 1.1], "loads[3].coefficients[1]": [0.0, 0.1]},
     "satellite": {
@@ -113,6 +124,12 @@ VARIED: dict[str, dict[str, list[Any]]] = {
         "initial.euler_angles[1]": [0.5, 1],
     },
     "elastic": {"body.elasticity.love_number": [0.1, 0.3], "body.elasticity.delay": [0.005, 0.01]},
+    "pair": {
+        "rigid_bodies[0].mass": [5e9, 2e10],
+        "rigid_bodies[0].velocity[1]": [1.0, 1.2],
+        "rigid_bodies[0].height": [0.5, 0.8],
+        "body.size[0]": [0.6, 0.7],
+    },
     "top": {"body.center_of_mass[2]": [0.5, 2], "body.principal_moments[2]": [0.5, 1.5]},
 }
 """Keys of each scene's sweep, with their values in each member."""

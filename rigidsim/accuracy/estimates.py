@@ -322,7 +322,8 @@ def _everywhere(prepared: InitialValueProblem, error: float, how: str) -> Estima
     attitude = error if prepared.system.requirements.attitude else None
     if prepared.system.flown is None:
         return Estimate(attitude, error, how)
-    return Estimate(attitude, error, how, *(error * size for size in _at_start(prepared.system)))
+    far, fast = _at_start(prepared.system)
+    return Estimate(attitude, error, how, error * far, error * fast)
 
 
 # --- by a better solution ---------------------------------------------------------------------------------

@@ -551,9 +551,8 @@ class SecondBody(Load):
         config, context = around.config, around.context
         _refuse_what_one_body_has(around)
         body = _built(fields, around)
-        for one, what in ((around.body, Problem("[body] mass", _NO_MASS)), (body, None)):
-            fault = around.fault("mass", _NO_MASS) if what is None else ConfigError(what)
-            ensure(one.mass is not None, fault)
+        ensure(around.body.mass is not None, ConfigError(Problem("[body] mass", _NO_MASS)))
+        ensure(body.mass is not None, around.fault("mass", _NO_MASS))
         places = [n for n, load in enumerate(config.loads) if isinstance(load, MutualGravityFields)]
         pair = None
         if places:
