@@ -54,10 +54,8 @@ def analyse_dataset(
     fastest = max([fastest, *(abs(float(k.value)) for k in known), _largest_rate(dataset)])
     # twice, since a body of three moments moves at twice its own rate, too
     faster = not fastest or 2 * fastest > clock.nyquist
-    seen = list(found)
-    if any(k.kind for k in known) and _EQUINOX in dataset and not any(s.name == _EQUINOX for s in signals):
-        seen += [_decomposed(x, clock, lines, floor, order) for x in signals_of(dataset, [_EQUINOX])]
-    names = [k for k in _with_precession(known, seen, clock) if float(k.value) != 0]
+    known = _with_equinox(known, dataset, clock)
+    names = [k for k in _with_precession(known, found, clock) if float(k.value) != 0]
     measured = [[(x.frequency, x.frequency_error, float(x.amplitude)) for x in one.lines] for one in found]
     in_body = [signal.in_body for signal in signals]
     names = settled(names, measured, in_body)
@@ -125,21 +123,28 @@ def _decomposed(
     )
 
 
+def _with_equinox(known: Sequence[Known], dataset: xarray.Dataset, clock: EquidistantTimes) -> list[Known]:
+    """The known frequencies with ``k``, at which the equinox moves back along the moving orbit, where secular
+    ones are known and ``precession`` was recorded. Two lines are taken off: more make the rate uncertain.
+    """
+    if _EQUINOX not in dataset or not any(k.kind for k in known):
+        return list(known)
+    [equinox] = [_decomposed(one, clock, 2, 1e-3, None) for one in signals_of(dataset, [_EQUINOX])]
+    if equinox.rate is None:
+        return list(known)
+    return [Known("k", -equinox.rate, 0.0, "rate of precession", equinox.rate_error, kind="k"), *known]
+
+
 def _with_precession(
     known: Sequence[Known], signals: Sequence[SignalAnalysis], clock: EquidistantTimes
 ) -> list[Known]:
     """The known frequencies with the equinox's, unless known: it moves back with the measured precession.
 
     Where an axis follows the node of an orbit, its rate is that node's. Of samples that don't span 1.5
-    turns of the slowest known frequency no precession is reported: its rate is partly theirs. With secular
-    frequencies of the planets it is ``k``, the rate at which the equinox moves back along the moving orbit.
+    turns of the slowest known frequency no precession is reported: its rate is partly theirs.
     """
     names = list(known)
-    if any(k.kind for k in known):
-        turning = [one for one in signals if one.name == _EQUINOX and one.rate is not None]
-        why = "secular rate of precession"
-        return [*(Known("k", -one.rate, 0.0, why, one.rate_error, kind="k") for one in turning), *names]
-    if not known or any(k.name == "precession" for k in known) or _slow(known, clock):
+    if not known or any(k.kind or k.name == "precession" for k in known) or _slow(known, clock):
         return names
     for one in signals:
         if one.name in (_SECULAR, "node_longitude"):

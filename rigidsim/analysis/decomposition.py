@@ -66,20 +66,19 @@ def decompose(
     The window's order is by default as high as the distance of the lines allows.
     """
     double = replace(samples, parts=samples.parts[:1], bits=min(samples.bits, 53))
-    search: _Search | None = None
+    found = []
     for search_order in (order,) if order else _SEARCH_ORDERS:
         search = _Search(double, degree, search_order)
         search.look_for(lines, floor)
-        if not search.close:
+        crowded = bool(search.close)
+        total, final = search.separated(order)
+        left = spectrum(double.remainder(total), _SEARCH_ORDERS[0], real=samples.real).sizes
+        found.append((float(np.mean(np.log(np.maximum(left, 1e-300)))), total, final, search))
+        if not crowded:
             break
-    assert search is not None
-    total = search.total
-    final = order or _final_order(total, samples.real)
-    total = settled(double, total, final)
-    while (weaker := _merged(total, samples.real, search.limit)) is not None:
-        search.close.append(float(total.frequencies[weaker]))
-        kept = [line for n, line in enumerate(total.lines) if n != weaker]
-        total = settled(double, total.with_lines(kept), final)
+    # a narrower window may take one line for two, and see no other near them: the remainder of the better
+    # search has the smaller spectrum, by its mean logarithm, to which all frequencies contribute
+    _, total, final, search = min(found, key=lambda one: one[0])
     if samples.bits > 53:
         total = refined(samples, total, final)
     return _judged(samples, total, final, search)
@@ -158,6 +157,16 @@ class _Search:
                 self.total = before
                 self.close.append(frequency)
                 hidden.append(frequency)
+
+    def separated(self, order: int | None) -> tuple[Sum, int]:
+        """The lines found, refined in a window of an order, without those that merged; and the order."""
+        final = order or _final_order(self.total, self.samples.real)
+        total = settled(self.samples, self.total, final)
+        while (weaker := _merged(total, self.samples.real, self.limit)) is not None:
+            self.close.append(float(total.frequencies[weaker]))
+            kept = [line for n, line in enumerate(total.lines) if n != weaker]
+            total = settled(self.samples, total.with_lines(kept), final)
+        return total, final
 
     def _strongest(self, found: Spectrum, hidden: Sequence[float], floor: float) -> int | None:
         """Index of the largest point that stands out from its neighbourhood; None if there is none."""
