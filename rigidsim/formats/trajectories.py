@@ -81,6 +81,7 @@ class Trajectory:
         lines: numbers of the rows as the file counts them; None: from 0.
         text: the text that the columns are from; cells that are no numbers are read there again.
         exact: whole numbers of columns that doubles can't hold.
+        reach: least and largest time (s) that an experiment has, if known, which are no Unix time.
     """
 
     columns: Mapping[str, np.ndarray]
@@ -97,6 +98,7 @@ class Trajectory:
     lines: np.ndarray | None = None
     text: TextTable | None = None
     exact: Mapping[str, np.ndarray] = field(default_factory=dict)
+    reach: tuple[float, float] | None = None
 
     def row(self, index: int) -> str:
         """A row as the file counts it."""
@@ -172,6 +174,8 @@ class Trajectory:
         """Dates of seconds, or parts of them, since 1970; None of other numbers."""
         values, unit = self.columns[name], self.unit(name)
         low, high = (np.min(values, initial=np.inf), np.max(values, initial=-np.inf))
+        if self.reach and unit in (None, "s") and self.reach[0] <= low <= high <= self.reach[1]:
+            return None
         sizes = (size for one, size in _UNIX.items() if unit in (None, one))
         fits = (x for x in sizes if _UNIX_RANGE[0] <= low * float(x) and high * float(x) < _UNIX_RANGE[1])
         if (size := next(fits, None)) is None:
@@ -282,10 +286,12 @@ def read_columns(path: Path) -> Trajectory:
     raise RigidsimError(f"{path}: of no known kind; allowed: {KINDS}, or the folder of a run")
 
 
-def read_trajectory(path: Path) -> Trajectory:
-    """The same, with dates where the file has them, or Unix time, in place of times."""
+def read_trajectory(path: Path, reach: tuple[float, float] | None = None) -> Trajectory:
+    """The same, with dates where the file has them, or Unix time, in place of times; ``reach`` as in
+    ``Trajectory``.
+    """
     found = read_columns(path)
-    return found if path.suffix.lower() in _XARRAY else found.dated()
+    return found if path.suffix.lower() in _XARRAY else replace(found, reach=reach).dated()
 
 
 def _unreadable(path: Path, error: Exception) -> RigidsimError:
@@ -301,13 +307,13 @@ def trajectory_of(table: Any, source: str = "the table") -> Trajectory:
     if hasattr(table, "data_vars"):
         return _of_dataset(table, source)
     if hasattr(table, "itertuples"):
-        return _of_frame(table, source).dated()
+        return _of_frame(table, source)
     if not isinstance(table, Mapping):
         raise RigidsimError(
             f"given {type(table).__name__}; a path, a mapping of names to arrays, a pandas DataFrame or an "
             "xarray Dataset is allowed"
         )
-    return _made(((str(name), np.asarray(value), ()) for name, value in table.items()), source).dated()
+    return _made(((str(name), np.asarray(value), ()) for name, value in table.items()), source)
 
 
 def _made(

@@ -204,6 +204,16 @@ def test_a_late_clock_is_found(seed: int) -> None:
         assert known.attitude_error.largest < 1e-8
 
 
+def test_an_experiments_own_times_are_no_unix_time() -> None:
+    motion = Motion(np.random.default_rng(3))
+    text = motion.text().replace("end = 8.0", "start = 1700000000\nend = 1700000008")
+    given = {"t": motion.times + 1.7e9, "q": motion.attitude.as_quat()}
+    with unoptimised_code():
+        found = rigidsim.compare(rigidsim.parse(text), given)
+    assert found.attitude_error.largest < 1e-6  # times of doubles
+    assert not any("Unix" in note for note in found.told)
+
+
 def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     motion = Motion(rng)

@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from support import config, loaded, run_text, seeds, unoptimised_code
+from support import config, loaded, run_text, same_bits, seeds, unoptimised_code
 
 import rigidsim
 
@@ -242,3 +242,18 @@ def test_starts_without_a_frame_are_refused(initial: str, load: str, said: str) 
     with pytest.raises(rigidsim.ConfigError) as caught:
         run_text(config(body=BODY, initial=initial, loads=load, time=f"end = 1\nsamples = 2{epoch}"))
     assert said in str(caught.value)
+
+
+def test_a_resumed_flight_has_the_same_bits(tmp_path: Path) -> None:
+    flight = "position = [7e6, 0, 1e5]\nvelocity = [0, 5e3, 5.5e3]\n" + START
+    load = f'kind = "central_gravity"\ngravitational_parameter = {GM}\n'
+    load += f"figure = {{J2 = {J2}, radius = {RADIUS}, pole = [0, 0, 1]}}"
+    text = config(
+        body=BODY, initial=flight, loads=load, time="end = 900\nsamples = 9",
+        integrator='precision = "quadruple"',
+    )  # fmt: skip
+    with unoptimised_code():
+        whole = loaded(run_text(text))
+        part = run_text(text, "limits.max_steps=2", out=tmp_path)
+        assert part.outcome.status == "stopped: max_steps"
+        same_bits(whole, rigidsim.resume(part.folder.path, overrides=["limits.max_steps=1000"]))

@@ -44,7 +44,8 @@ def trajectory_given(table: Any, scene: Scene, kernels: Sequence[str | Path]) ->
         with table.dataset as dataset:
             return trajectory_of(dataset, table.place)
     if not isinstance(table, str | Path):
-        return trajectory_of(table)
+        found = trajectory_of(table)
+        return found if hasattr(table, "data_vars") else replace(found, reach=scene.reach).dated()
     path = Path(table)
     if path.suffix.lower() == ck_reading.SUFFIX or kernels:
         if scene.epoch is None:
@@ -53,7 +54,7 @@ def trajectory_given(table: Any, scene: Scene, kernels: Sequence[str | Path]) ->
         return ck_reading.read_ck(path, files, zero, *scene.reach)
     if path.is_dir() and path.suffix != ".zarr":
         return trajectory_given(open_run(path), scene, kernels)
-    return read_trajectory(path).in_axes(scene.axes)
+    return read_trajectory(path, scene.reach).in_axes(scene.axes)
 
 
 def files_of(table: Any, kernels: Sequence[str | Path] = ()) -> list[Path]:

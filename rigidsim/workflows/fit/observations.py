@@ -300,7 +300,8 @@ class _Reader:
             what = f"{self.table.file} is one of several files, of which a fit copies one; write one table"
             ensure(file.suffix != ".42", self._fault("file", what))
             saved = file / "dataset.h5"  # where the file is the folder of a run
-            return read_columns(saved if saved.is_file() else file).in_axes(self.scene.axes)
+            found = read_columns(saved if saved.is_file() else file)
+            return replace(found, reach=self.scene.reach).in_axes(self.scene.axes)
         if self.scene.epoch is None:
             what = "is a CK, which holds dates; give the date of time 0 as [time] epoch"
             raise self._fault("file", f"{self.table.file} {what}")
