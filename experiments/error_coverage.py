@@ -5,7 +5,10 @@ double, 128 for these), or from an exact solution where a kink would mislead eve
 are those in which estimates are most likely to be wrong; all formulations, three precisions, loose tolerances
 and projected invariants take part.
 
-Run: python -m experiments.error_coverage [--first 0] [--count 1000] [--seed 1] [--only FAMILY]
+With --reversed, shortened scenes go forth and back in all precisions, half of them into the past first: the
+difference from their start is held against what both ways announce.
+
+Run: python -m experiments.error_coverage [--first 0] [--count 1000] [--seed 1] [--only FAMILY] [--reversed]
 Exit code 1 if a promise was broken.
 """
 
@@ -17,7 +20,7 @@ import numpy as np
 
 from experiments.common import Command
 from experiments.coverage.families import FAMILIES, coverage_scene
-from experiments.coverage.judging import Judged, judge, judge_average
+from experiments.coverage.judging import Judged, judge, judge_average, judge_reversal
 
 FALSE_ALARM = 1e-4  # rad
 
@@ -87,14 +90,15 @@ def broken_promises(judged: Sequence[Judged]) -> list[str]:
 
 
 @Command
-def campaign(first: int = 0, count: int = 1000, seed: int = 1, only: str = "") -> int:
+def campaign(first: int = 0, count: int = 1000, seed: int = 1, only: str = "", reversed: bool = False) -> int:
     """Judge scenes, and print a line for each, the table, and the promises that were broken."""
     judged = []
     for number in range(first, first + count):
         scene = coverage_scene(number, seed)
         if only in ("", scene.family):
             try:
-                judged.append((judge_average if FAMILIES[scene.family].averaged else judge)(scene))
+                how = judge_average if FAMILIES[scene.family].averaged else judge
+                judged.append((judge_reversal if reversed else how)(scene))
             except Exception as error:  # a scene that breaks the study is an outcome, and fails it
                 text = f"{type(error).__name__}: {error}"[:200]
                 judged.append(Judged(number, scene.family, text, "broken"))

@@ -198,11 +198,8 @@ def _fixed_source(draw: Draw) -> None:
     draw.start(draw.direction())
     where = draw.direction() * 1e3 * draw.length
     strength = (draw.decades(-1.5, -0.5) / draw.time) ** 2 * (1e3 * draw.length) ** 3
-    draw.load(
-        "gravity_gradient",
-        f"gravitational_parameter = {float(strength)!r}",
-        f"position = {[float(x) for x in where]}",
-    )
+    place = f"position = {[float(x) for x in where]}"
+    draw.load("gravity_gradient", f"gravitational_parameter = {float(strength)!r}", place)
 
 
 def _on_orbit(draw: Draw, eccentricity: float) -> None:

@@ -53,17 +53,10 @@ def _slow_body(draw: Draw) -> None:
     """The orbit is quick, the body hardly turns."""
     draw.body(draw.moments(), turned=draw.sometimes(0.3))
     draw.start(draw.direction() * draw.decades(-5, -1))
-    motion = 1 / draw.time
-    draw.load(
-        "gravity_gradient",
-        f"gravitational_parameter = {motion**2 * (1e3 * draw.length) ** 3 * draw.decades(-4, 0)!r}",
-        orbit(
-            1e3 * draw.length,
-            eccentricity=draw.between(0, 0.6),
-            inclination=draw.between(0, 3),
-            period=2 * math.pi / motion,
-        ),
-    )
+    motion, axis = 1 / draw.time, 1e3 * draw.length
+    strength, turn = motion**2 * axis**3 * draw.decades(-4, 0), 2 * math.pi / motion
+    way = orbit(axis, eccentricity=draw.between(0, 0.6), inclination=draw.between(0, 3), period=turn)
+    draw.load("gravity_gradient", f"gravitational_parameter = {strength!r}", way)
 
 
 def _eccentric(draw: Draw) -> None:

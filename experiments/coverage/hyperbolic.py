@@ -50,20 +50,10 @@ def hyperbolic_average(draw: Draw) -> None:
     draw.start([spin * wobble, 0, spin])
     draw.lines[-1] = f"quaternion = {[float(q) for q in quaternion / np.linalg.norm(quaternion)]}"
     distance = 1e3 * draw.length
-    draw.load(
-        "gravity_gradient",
-        f"gravitational_parameter = {distance**3 / draw.time**2!r}",
-        orbit(
-            distance,
-            period=_TURN * draw.time,
-            eccentricity=eccentricity,
-            inclination=tilt,
-            ascending_node=node,
-            periapsis=draw.between(0, 6),
-            mean_anomaly=draw.between(0, 6),
-            node_rate=node_rate / draw.time,
-        ),
-    )
+    elements = {"period": _TURN * draw.time, "eccentricity": eccentricity, "inclination": tilt}
+    elements |= {"ascending_node": node, "periapsis": draw.between(0, 6), "mean_anomaly": draw.between(0, 6)}
+    strength = f"gravitational_parameter = {distance**3 / draw.time**2!r}"
+    draw.load("gravity_gradient", strength, orbit(distance, **elements, node_rate=node_rate / draw.time))
     level = "spin_averaged" if draw.sometimes(0.5) else "orbit_averaged"
     draw.more += ["[model]", f'level = "{level}"']
     draw.more += [f"short_period = {str(draw.sometimes(0.5)).lower()}"]

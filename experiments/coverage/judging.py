@@ -11,7 +11,8 @@ import numpy as np
 import rigidsim
 from experiments.coverage import moments
 from experiments.coverage.families import SAMPLES, CoverageScene
-from rigidsim.errors import ConfigError
+from rigidsim.accuracy.reversal import there_and_back
+from rigidsim.errors import ConfigError, RigidsimError
 from rigidsim.scene.cautions import WarningCode
 from rigidsim.scene.config import Experiment
 from rigidsim.session.execution import Diagnostics
@@ -29,6 +30,8 @@ GONE = (WarningCode.ATTITUDE_UNCERTAIN, WarningCode.RATES_UNCERTAIN)
 Vectors = list[list[mpmath.mpf]]
 """(samples, components)."""
 _AXES = ("momentum_axis", "figure_axis")
+_TURNS = ("double", "double", "extended", "quadruple", "single")
+_SHORT = 20.0  # rad, of scenes that go forth and back
 _TRUTH = {"single": "double", "double": "extended", "extended": "quadruple"}
 
 
@@ -172,6 +175,23 @@ def judge_average(scene: CoverageScene) -> Judged:
     true, said = max(pairs, key=lambda pair: pair[0] / max(pair[1], 1e-300))
     codes = {caution.code for caution in found.cautions()}
     return replace(begin, true=true, announced=said, gone=WarningCode.MODEL_UNCERTAIN in codes)
+
+
+def judge_reversal(scene: CoverageScene) -> Judged:
+    """Integrate a shortened scene to its end and back; scenes take turns in direction and precision."""
+    turn = "60" if scene.number % 60 == 59 else f'"{_TURNS[scene.number // 2 % len(_TURNS)]}"'
+    setting = [] if "precision = " in scene.text else [f"integrator.precision={turn}"]
+    end = float(scene.text.split("[time]\nend = ")[1].split("\n")[0]) * min(1.0, _SHORT / scene.radians)
+    asked = [*setting, f"limits.max_steps={MOST_STEPS // 5}"]
+    asked += [f"time.end={-end if scene.number % 2 else end!r}", "time.samples=2"]
+    begin = Judged(scene.number, scene.family, " ".join(setting), "refused", scene.radians)
+    try:
+        found = there_and_back(rigidsim.parse(scene.text, overrides=asked), compact=True)
+    except RigidsimError as error:
+        return replace(begin, warned=str(error).splitlines()[-1])
+    apart = found.rates if found.attitude is None else found.attitude
+    known = {"true": apart or 0.0, "announced": math.nan if found.announced is None else found.announced}
+    return replace(begin, ended="finished", steps=found.steps, **known)
 
 
 def _setting(scene: CoverageScene) -> str:

@@ -51,6 +51,12 @@ source = "sun"
 """
 """Its kernel's blocks end every 4 and every 16 days, which are 1 and 4 samples here."""
 DAYS = 86400
+KINKED = '[[loads]]\nkind = "torque"\ncomponents = ["0.01*sign(wx - 0.2)", "0.02*abs(sin(t))", "0"]\n'
+_ROWS = "".join(f"{100 * n}, 1000, {0.1 + 0.001 * (n % 7)}, 0.2, {3.16 * n:.2f}\n" for n in range(-42, 43))
+TABLE = (
+    '[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 1e6\norbit = {table = "t.csv"}\n'
+    f'[tables."t.csv"]\ntext = """time, semi_major_axis, eccentricity, periapsis, mean_anomaly\n{_ROWS}"""\n'
+)
 # end, samples, [integrator], rest, [output]
 MOONS = {
     "moon_double": (1000 * DAYS, 251, "", "", ""),
@@ -71,7 +77,11 @@ SCENES = {
     "quadruple_dense": (80, 321, 'precision = "quadruple"', "", ""),
     "quadruple_events": (60, 61, 'precision = "quadruple"\nformulation = "rotation_matrix"', EVENT, ""),
     **MOONS,
+    "double_kinked": (600, 601, "", KINKED + EVENT, ""),
+    "double_table": (4000, 4001, "", TABLE, ""),
 }
+_BACK = ("driven", "held", "kinked", "table", "double")
+SCENES |= {f"{n}_back": (-end, *rest) for n, (end, *rest) in SCENES.items() if n.split("_")[1] in _BACK}
 
 
 def text_of(name: str, longer: int = 1) -> str:
@@ -82,7 +92,7 @@ def text_of(name: str, longer: int = 1) -> str:
     """
     end, samples, integrator, rest, output = SCENES[name]
     end *= longer
-    body, epoch = (MOON, 'epoch = "1969-06-28T00:00:00 TDB"\n') if name in MOONS else (BODY, "")
+    body, epoch = (MOON, 'epoch = "1969-06-28T00:00:00 TDB"\n') if name.startswith("moon") else (BODY, "")
     return (
         f'name = "{name}"\n{body}{rest}[time]\n{epoch}end = {end}\nsamples = {samples}\n'
         # a run that may be stopped isn't refused where the disk is too small for all of it

@@ -4,6 +4,7 @@ By how much the way back misses the start is what both ways have made of roundin
 measure that needs no other solution. It says nothing of the model, nor of errors that both ways share.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -22,6 +23,7 @@ from rigidsim.solve.problem import InitialValueProblem, prepare_scene
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
 
+_RUNAWAY, _SOME = 10, 1000  # times the steps there, and more, after which a way back has left the motion
 _BEYOND = 10.0  # times the announced error: no run is further off without a warning
 _SMALL = {
     "quaternion": "attitude",
@@ -70,8 +72,11 @@ class Reversal:
         return f"integrated to the end and back, it returns to its start: {', '.join(parts)}{announced}"
 
 
-def there_and_back(experiment: Experiment, loads: Sequence[Load] = ()) -> Reversal:
+def there_and_back(experiment: Experiment, loads: Sequence[Load] = (), *, compact: bool = False) -> Reversal:
     """Integrate an experiment's motion to its last sample and back.
+
+    Args:
+        compact: to equations that are compiled sooner, and slower.
 
     Raises:
         ConfigError: it can't be integrated.
@@ -83,14 +88,16 @@ def there_and_back(experiment: Experiment, loads: Sequence[Load] = ()) -> Revers
     if "quaternion" in names and "momentum_axis" in names:
         names.remove("momentum_axis")
     if not names:
+        prepare_scene(experiment, build_scene(experiment), loads=loads)  # which may say why
         raise ConfigError(Problem("[integrator]", "the motion has neither an attitude nor rates to compare"))
     quiet = experiment.quiet(names)
     scene = build_scene(quiet)
     scene = _between(scene, scene.start, scene.samples.last)
     there = prepare_scene(quiet, scene, loads=loads)
-    one = _taken(there, names, "the motion")
+    there = replace(there, precision=replace(there.precision, compact=compact or there.precision.compact))
+    one = _taken(there, names, "the motion", experiment.config.limits.max_steps or math.inf)
     back = _reversed(there, one.state)
-    other = _taken(back, names, "the motion back")
+    other = _taken(back, names, "the motion back", _RUNAWAY * one.progress.steps + _SOME)
     found = {_SMALL[name]: _apart(name, one[name], other[name]) for name in names}
     begun, own = (
         estimate_errors(
@@ -125,11 +132,17 @@ def _between(scene: Scene, start: object, end: object) -> Scene:
     return replace(scene, start=start, end=end, samples=samples)
 
 
-def _taken(problem: InitialValueProblem, names: Sequence[str], what: str) -> Collected:
-    found = Collected(problem, names)
-    if found.progress.status is not Status.FINISHED:
-        raise RigidsimError(f"{what} {found.progress.status.message}, before its end; nothing was compared")
-    return found
+def _taken(problem: InitialValueProblem, names: Sequence[str], what: str, most: float) -> Collected:
+    found = Collected(problem, names, lambda now: Status.MAX_STEPS if now.steps > most else None)
+    status, seconds = found.progress.status, found.progress.time
+    if status is Status.FINISHED:
+        return found
+    why = status.message
+    if status is Status.MAX_STEPS:
+        why = f"it takes more than {most:,.0f} steps"
+    raise RigidsimError(
+        f"{what} ends at {seconds:.6g} s, before its last sample: {why}; nothing was compared"
+    )
 
 
 def _reversed(there: InitialValueProblem, state: np.ndarray) -> InitialValueProblem:

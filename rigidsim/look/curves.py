@@ -11,9 +11,8 @@ import xarray
 from rigidsim.look import gyrostats, signals, sources
 from rigidsim.look.fits import secular
 from rigidsim.look.record import scene_of
-from rigidsim.look.signals import clock, in_words, is_averaged, need, optional
+from rigidsim.look.signals import clock, from_start, in_words, is_averaged, need, optional
 from rigidsim.look.solids import Array, Color
-from rigidsim.scene.parts_of_values import BACKWARDS
 from rigidsim.scene.readable import DAY, angle_text, named_unit, scaled, turning_text, with_unit
 
 HUES: dict[str, tuple[str, Color]] = {
@@ -140,8 +139,7 @@ def uncertain(dataset: xarray.Dataset, values: Array, divisor: float) -> Array |
 def _share(dataset: xarray.Dataset) -> Array:
     """The share of the run until each row (rows,); a run that goes back begins at the last one."""
     seconds = np.asarray(dataset["time"].values, dtype=np.float64)
-    begin = seconds[-1] if dataset.attrs.get(BACKWARDS) else seconds[0]
-    return np.abs(seconds - begin) / (abs(seconds[-1] - seconds[0]) or 1.0)
+    return np.abs(seconds - from_start(dataset, seconds)[0]) / (abs(seconds[-1] - seconds[0]) or 1.0)
 
 
 def drift_plot(dataset: xarray.Dataset) -> Plot | None:

@@ -129,7 +129,9 @@ def _periods(rows: xarray.Dataset) -> list[tuple[str, str]]:
     """How long the body takes to turn, to flip, and to go round what it goes round."""
     found: list[tuple[str, str]] = []
     seconds, rates = signals.seconds(rows), signals.values(rows, "angular_velocity", 3)
-    size = np.zeros(1) if rates is None else signals.norms(signals.finite_rows(rates))
+    size = np.zeros(1)
+    if rates is not None:
+        size = signals.from_start(rows, signals.norms(signals.finite_rows(rates)))
     if rates is not None and len(size) and size.min() > _AT_REST * size.max():
         part = -(-len(size) // _PARTS)
         shown = [float(one.mean()) for one in (size, size[:part], size[-part:])]

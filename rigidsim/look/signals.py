@@ -15,6 +15,7 @@ import xarray
 from rigidsim.look.record import scene_of
 from rigidsim.look.solids import Array, rotation_matrix
 from rigidsim.scene.epochs import J2000
+from rigidsim.scene.parts_of_values import BACKWARDS
 from rigidsim.scene.readable import YEAR, TimeUnit, epoch_of, julian_year, unit_of
 from rigidsim.scene.space_axes import CELESTIAL, EQUATOR, obliquity, to_equator
 
@@ -85,6 +86,11 @@ def values(dataset: xarray.Dataset, name: str, width: int | None = None) -> Arra
 def seconds(dataset: xarray.Dataset) -> Array:
     """Sample times (rows,), s."""
     return np.asarray(dataset["time"].values, dtype=np.float64)
+
+
+def from_start(dataset: xarray.Dataset, rows: Array) -> Array:
+    """Rows, in the order of time, as the run took them: from the last one on if it went backwards."""
+    return rows[::-1] if dataset.attrs.get(BACKWARDS) else rows
 
 
 def clock(dataset: xarray.Dataset) -> tuple[Array, TimeUnit, str]:

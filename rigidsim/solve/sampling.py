@@ -76,7 +76,7 @@ class SampleClock:
 
     def parts(self, first: int, times: np.ndarray) -> list[np.ndarray]:
         """Labels of samples from ``first`` on (s) and residuals, which sum exactly to the time."""
-        exact = times / self._per_second
+        exact = times / self._per_second + self.precision.of_double(0.0)  # zero without a sign
         if self.precision.bits == 53:
             return [exact]
         parts = self.precision.parts(exact, self.labels(first, first + len(times)))

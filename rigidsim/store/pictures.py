@@ -13,6 +13,7 @@ import numpy as np
 from rigidsim.errors import RunFolderError
 from rigidsim.look import film
 from rigidsim.scene.exact import parse_number
+from rigidsim.scene.parts_of_values import in_time_order
 from rigidsim.scene.readable import TimeWords
 from rigidsim.store.outputs import writing
 
@@ -48,6 +49,7 @@ def draw(
     """
     if part not in PARTS:
         raise RunFolderError(f"--part: given {part}; {', '.join(PARTS)} is allowed")
+    dataset = in_time_order(dataset)
     share = _telling(dataset) if at is None else _share(dataset, at)
     from rigidsim.look.timeline import write_timeline  # which loads rerun, see look.viewer
 

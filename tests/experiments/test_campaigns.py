@@ -6,9 +6,11 @@ from pathlib import Path
 
 import mpmath
 import pytest
+from support import seeds
 
 from experiments import error_coverage
-from experiments.coverage.judging import Judged, apart
+from experiments.coverage.families import coverage_scene
+from experiments.coverage.judging import Judged, apart, judge_reversal
 from experiments.durability.judging import Tally
 from experiments.durability.sweeps import WAYS, disturb_sweeps
 
@@ -34,6 +36,17 @@ def test_broken_promises_are_found() -> None:
     assert any("digits said to be gone" in line and "[201]" in line for line in alarmed)
     wide = [judged(1e-12, 1e-9, number=n) for n in range(200)]
     assert any("median announced over true" in line for line in error_coverage.broken_promises(wide))
+
+
+@pytest.mark.parametrize("seed", seeds(2, 60))
+def test_random_scenes_go_forth_and_back_within_ten_times_what_both_ways_announce(seed: int) -> None:
+    """In any precision, half of them into the past first; what is damped forwards may run away backwards."""
+    found = judge_reversal(coverage_scene(seed, seed=2))
+    if found.ended == "finished":
+        assert not found.true > 10 * found.announced, found.line
+    else:
+        runaway = "more than" in found.warned or "finite" in found.warned
+        assert runaway or "depends on the sign" in found.warned, found.line
 
 
 def test_places_are_compared_in_all_their_digits() -> None:

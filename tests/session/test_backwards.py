@@ -11,6 +11,7 @@ from test_contracts import CASES, EPSILON, SCENES, settings
 import rigidsim
 from rigidsim.accuracy.reversal import there_and_back
 from rigidsim.solve.problem import prepare
+from rigidsim.store import pictures
 
 BACK = "end = -3\nsamples = 49"
 DRIVEN = (
@@ -140,3 +141,21 @@ def test_derivatives_by_a_rate_are_differences_of_runs() -> None:
     ]
     before, after = (end.angular_velocity.isel(time=-1).values for end in ends)
     np.testing.assert_allclose(found, (after - before) / 2e-5, rtol=1e-8)
+
+
+def test_pictures_mark_the_start_and_count_moments_in_the_order_of_time(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Of a slow spin: the pole starts at a known place; a quarter of the run back is 0.75 of its timeline."""
+    drawn: list[float] = []
+    monkeypatch.setattr(pictures, "draw_recording", lambda *_, at, **__: drawn.append(at))
+    text = config("principal_moments = [1, 1, 1.5]", "angular_velocity = [0.01, 0, 1]", time="end = -40")
+    run = run_text(text)
+    pictures.draw(run.dataset, tmp_path / "made.png", at="-10")
+    assert drawn == [0.75]
+    assert not np.signbit(run.dataset.time.values[0])
+    starts = {}
+    for end in ("-40", "40"):
+        axes = run_text(text.replace("end = -40", f"end = {end}")).plot("pole_path").axes[0]
+        starts[end] = next(one.get_xydata() for one in axes.get_lines() if one.get_label() == "start")
+    np.testing.assert_allclose(starts["-40"], starts["40"], rtol=0, atol=1e-6 * np.abs(starts["40"]).max())

@@ -33,9 +33,9 @@ from rigidsim.look.pages import leading, numbers
 from rigidsim.look.paths import PATHS
 from rigidsim.look.paths import Path as PlanePath
 from rigidsim.look.record import scene_of
-from rigidsim.look.signals import clock, need, optional
+from rigidsim.look.signals import clock, from_start, need, optional
 from rigidsim.look.thinning import thin
-from rigidsim.scene.parts_of_values import in_time_order
+from rigidsim.scene.parts_of_values import BACKWARDS, in_time_order
 from rigidsim.scene.readable import scaled, span_text, unit_for, with_unit
 
 _HUES = {"spin axis": "orange", "momentum axis": "violet", "core axis": "pink"}
@@ -77,7 +77,7 @@ def draw(axes: Axes, dataset: xarray.Dataset, panel: Panel | None, *, dense: boo
     if isinstance(panel, Plot):
         _plot(axes, dataset, panel, dense=dense)
     elif isinstance(panel, PlanePath):
-        _path(axes, panel)
+        _path(axes, dataset, panel)
     elif panel is not None:
         panel(axes)
 
@@ -115,9 +115,10 @@ def _plot(axes: Axes, dataset: xarray.Dataset, plot: Plot, *, dense: bool) -> No
     axes.set_ylabel(with_unit(plot.word, plot.unit))
 
 
-def _path(axes: Axes, path: PlanePath) -> None:
+def _path(axes: Axes, dataset: xarray.Dataset, path: PlanePath) -> None:
     """Draw a path, a cross at the origin as its center, and its surroundings."""
-    style.trace(axes, *path.points.T, sparse=path.sparse)
+    later = "earlier" if dataset.attrs.get(BACKWARDS) else "later"
+    style.trace(axes, *from_start(dataset, path.points).T, sparse=path.sparse, later=later)
     faint: dict[str, Any] = {"lw": 0.7, "alpha": 0.6, "zorder": 1, "sparse": path.sparse, "in_plane": True}
     for name, points in path.others.items():
         curve(axes, *points.T, color=paper(_HUES[name]), label=name, **faint)
@@ -176,6 +177,7 @@ def flight(dataset: xarray.Dataset) -> Panel | None:
     position, flat = signals.values(dataset, "position", 3), paths.flight(dataset)
     if flat is not None or position is None:
         return flat
+    position = from_start(dataset, position)
     scale, unit = scaled(position - position[0], "m")
 
     def drawn(axes: Axes) -> None:
@@ -214,7 +216,8 @@ class Shown:
     def of(cls, dataset: xarray.Dataset) -> Self:
         """Read the rows that a figure draws of a dataset, possibly lazy."""
         dataset = in_time_order(dataset)
-        parts = [dataset, dataset.isel(time=slice(0, ROWS))]
+        begun = slice(-ROWS, None) if dataset.attrs.get(BACKWARDS) else slice(0, ROWS)
+        parts = [dataset, dataset.isel(time=begun)]
         return cls(*(thin(part, ROWS).assign_attrs(dataset.attrs) for part in parts))
 
     def begins(self, name: str, plot: Plot) -> float:
@@ -224,7 +227,7 @@ class Shown:
         begun = CURVES[name](self.start) if plot.begins else None
         length, span = (abs(float(x[-1] - x[0])) for x in map(signals.seconds, (self.start, self.rows)))
         most, settling = 0, 0.0
-        for column in () if begun is None else begun.values.T:
+        for column in () if begun is None else from_start(self.start, begun.values).T:
             values = column[np.isfinite(column)]
             if len(values) >= 50 and moves(values):
                 changes = crossings(values)
@@ -246,7 +249,9 @@ class Shown:
             if line.get_linestyle() == "None":  # few enough now to be distinguished and followed
                 line.set(linestyle="-", linewidth=0.6, markersize=5.0)
         time, unit, _ = clock(start)
-        axes.set(xlim=(time[0], time[0] + begins / unit.seconds), xlabel=f"time [{unit.symbol}]")
+        first, length = from_start(start, time)[0], begins / unit.seconds
+        limits = (first - length, first) if start.attrs.get(BACKWARDS) else (first, first + length)
+        axes.set(xlim=limits, xlabel=f"time [{unit.symbol}]")
 
 
 def compose(

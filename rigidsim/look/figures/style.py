@@ -34,7 +34,6 @@ MOST_VECTOR_POINTS = 6000  # of a curve in an SVG; longer ones become pixels the
 _OVER_TIME = 0.8  # radii of the whole between neighbours that are joined: some eight samples a turn
 _KEY_ROW = 12.4  # height of a row of a key, points
 _KEY_LETTER, _TITLE_LETTER = 4.9, 6.1  # mean widths of a letter, points
-_LATER = "lighter: later"
 _MARGIN = 0.08  # of a square panel
 _HEADING = (0.34, 0.26)  # inches of the page's two heading lines
 
@@ -183,11 +182,11 @@ def curve(
     axes.plot(x, y, **style)
 
 
-def trace(axes: Axes, x: Array, y: Array, *, sparse: bool = False) -> None:
+def trace(axes: Axes, x: Array, y: Array, *, sparse: bool = False, later: str = "later") -> None:
     """Draw a path in a plane: of many turns about the origin the first stand out, otherwise coloured by time;
     of samples that aren't dense enough, or are known to be `sparse`, the points.
 
-    The start is marked. All that stands out has a label.
+    The start, the first point, is marked. All that stands out has a label. ``later``: what later points are.
     """
     points = np.stack([x, y], axis=1)
     many = len(x) > MOST_VECTOR_POINTS
@@ -196,7 +195,7 @@ def trace(axes: Axes, x: Array, y: Array, *, sparse: bool = False) -> None:
         size = float(np.clip(9000 / max(len(x), 1), 1.2, 12.0))
         hues = np.linspace(0.0, 0.86, len(x))
         axes.scatter(x, y, c=hues, cmap="plasma", vmin=0, vmax=1, s=size, lw=0, rasterized=many)
-        axes.plot([], [], ".", color=colormaps["plasma"](0.6), lw=0, label=_LATER)
+        axes.plot([], [], ".", color=colormaps["plasma"](0.6), lw=0, label=f"lighter: {later}")
         return
     first, label = _first_turns(points)
     if first:
@@ -209,7 +208,7 @@ def trace(axes: Axes, x: Array, y: Array, *, sparse: bool = False) -> None:
     parts = [points[a : b + 1] for a, b in itertools.pairwise(edges)]
     hues = colormaps["plasma"](np.linspace(0.0, 0.86, pieces))
     axes.add_collection(LineCollection(parts, colors=hues, linewidths=1.4, rasterized=many))
-    axes.plot([], [], color=colormaps["plasma"](0.6), label=_LATER)
+    axes.plot([], [], color=colormaps["plasma"](0.6), label=f"lighter: {later}")
 
 
 def _first_turns(points: Array) -> tuple[int, str]:

@@ -28,8 +28,9 @@ from rigidsim.look.figures.style import GREY, INK, MOST_VECTOR_POINTS, PALE, PIN
 from rigidsim.look.gyrostats import Gyrostat
 from rigidsim.look.paths import herpolhode_plane
 from rigidsim.look.record import scene_of
-from rigidsim.look.signals import joined, need, optional
+from rigidsim.look.signals import from_start, joined, need, optional
 from rigidsim.look.solids import Array, rotation_matrix
+from rigidsim.scene.parts_of_values import BACKWARDS
 from rigidsim.scene.readable import scaled, typeset
 
 Mask = NDArray[np.bool_]
@@ -215,7 +216,8 @@ def polhode(dataset: xarray.Dataset) -> Draw:
 def _polhode(axes: Axes, dataset: xarray.Dataset, rates: Array) -> None:
     found, moments = surfaces(dataset), scene_of(dataset).moments
     scale, unit = scaled(rates if found is None else np.concatenate(found), "rad/s")
-    names, points = [f"$ω_{name}$" for name in signals.axis_names(dataset)], rates / scale
+    names = [f"$ω_{name}$" for name in signals.axis_names(dataset)]
+    points = from_start(dataset, rates / scale)
     if found is None or moments is None:
         view = View.of(axes, _VIEWS[0])
         view.line(points, color=PINK, lw=1.9, zorder=5)
@@ -255,16 +257,16 @@ def _polhode_way(points: Array, radii: Array, moments: Array) -> Array:
 
 @optional
 def poinsot(dataset: xarray.Dataset) -> Draw:
-    """The ellipsoid of energy as it rolls on the invariable plane, at the first sample."""
+    """The ellipsoid of energy as it rolls on the invariable plane, at the start."""
     radii, rates = need(surfaces(dataset))[0], need(signals.principal_rates(dataset))
     quaternion, along = need(signals.values(dataset, "quaternion")), need(signals.steady_momentum(dataset))
     # The picture's axes: across, across, and -L upwards, so that the plane lies below the body.
     first, second = signals.across(along)
     to_picture = np.stack([first, -second, -along])
-    turn = to_picture @ rotation_matrix(quaternion[:1])[0] @ scene_of(dataset).axes.T
+    turn = to_picture @ rotation_matrix(from_start(dataset, quaternion)[:1])[0] @ scene_of(dataset).axes.T
     scale, _ = scaled(radii, "rad/s")
-    traced = herpolhode_plane(dataset) / scale
-    return partial(_poinsot, radii=radii / scale, traced=traced, points=rates / scale, turn=turn)
+    traced, points = herpolhode_plane(dataset) / scale, from_start(dataset, rates / scale)
+    return partial(_poinsot, radii=radii / scale, traced=traced, points=points, turn=turn)
 
 
 def _poinsot(axes: Axes, radii: Array, traced: Array, points: Array, turn: Array) -> None:
@@ -291,16 +293,17 @@ def _poinsot(axes: Axes, radii: Array, traced: Array, points: Array, turn: Array
 
 @optional
 def sphere(dataset: xarray.Dataset, row: int) -> Draw:
-    """Levels of the energy at the first row, or at the last if motors have changed them, separatrices,
+    """Levels of the energy where the run starts, or ends if motors have changed them, separatrices,
     equilibria, and the path of the run, its start and positive axes on the side that is seen.
     """
     driven = any(rotor.works for rotor in gyrostats.rotors(dataset))
     need(row == 0 or driven)
-    whole, gyrostat = need(gyrostats.path(dataset)), need(Gyrostat.of(dataset, row))
+    way = from_start(dataset, need(gyrostats.path(dataset)))
+    gyrostat = need(Gyrostat.of(dataset, -1 - row if dataset.attrs.get(BACKWARDS) else row))
     title = "Momentum sphere in body axes: levels of energy"
     if driven:
         title = f"Momentum sphere: levels of energy if motors stopped at the {'end' if row else 'start'}"
-    return partial(_sphere, ways=whole / signals.norms(whole)[:, None], gyrostat=gyrostat, title=title)
+    return partial(_sphere, ways=way / signals.norms(way)[:, None], gyrostat=gyrostat, title=title)
 
 
 def _sphere(axes: Axes, ways: Array, gyrostat: Gyrostat, title: str) -> None:

@@ -336,7 +336,7 @@ def flight(dataset: xarray.Dataset, subject: Subject) -> Picture:
             *(part for part in kept if level == 0.0 or part.path != origin),
             *fixed_arrow(words, words, parts.PULL, place, along, words, radius=radius),
             parts.grid("ground", floor, first, second, size, 5, 0.5),
-            parts.spot("start", "start", parts.PALE, points[0], size=4.0),
+            parts.spot("start", "start", parts.PALE, signals.from_start(dataset, points)[0], size=4.0),
         ],
         camera=Camera(center + 0.82 * extent / np.sin(FIELD / 2) * direction, center, up),
     )
