@@ -546,7 +546,7 @@ def orbits(
     end: Annotated[
         str, options.option("--end", "TIME", 'Last time, from J2000; negative in the past: "-1 Myr".')
     ],
-    every: Annotated[str, options.option("--every", "TIME", "From one row to the next.")] = "1 kyr",
+    every: Annotated[str, options.option("--every", "TIME", "Interval between rows.")] = "1 kyr",
     window: Annotated[
         str, options.option("--window", "TIME", "Length of the average (Hann's weights); 0 for none.")
     ] = "1 kyr",
@@ -560,7 +560,7 @@ def orbits(
     """Integrate the planets from J2000 (needs rigidsim[orbits]), and write tables of their averaged elements,
     which orbit = {table = "PLANET.csv"} reads.
 
-    A million years take some four minutes. Ctrl-C keeps the rows that are there.
+    A million years take some four minutes. Ctrl-C keeps finished rows.
 
     Example: rigidsim orbits earth --end "-10 kyr" --every "400 yr"
     """

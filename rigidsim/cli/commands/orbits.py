@@ -23,4 +23,4 @@ def _print(found: Orbits) -> None:
         reached = f"{found.reached:,.6g} yr" if found.rows else "the first row"
         print(f"rigidsim: interrupted at {reached}; the rows are kept, --force begins again", file=sys.stderr)
     if abs(found.reached) > CHAOTIC:
-        print("beyond some 50 Myr this orbit is one of many that fit what is known")
+        print("beyond some 50 Myr this orbit is one of many that fit the observations")

@@ -575,7 +575,7 @@ class SecondBody(Load):
         return made
 
 
-_NO_MASS = "missing; two bodies need theirs, since each moves as the other one is heavy"
+_NO_MASS = "missing; two bodies need both masses, which decide how far each moves"
 _ALLOWED = ("mutual_gravity", "torque", "viscous_torque")
 
 
@@ -585,21 +585,15 @@ def _refuse_what_one_body_has(around: Setting) -> None:
     for key in ("core", "elasticity"):
         what = f"given with [[{_TABLE}]], whose bodies are rigid; remove one of them"
         ensure(getattr(config.body, key) is None, ConfigError(Problem(f"[body] {key}", what)))
-    what = (
-        f"given with [[{_TABLE}]], whose positions count from [body] and whose centre of mass is left out; "
-    )
+    what = f"given with [[{_TABLE}]], whose positions are relative to [body]; "
     ensure(not config.initial.flies, ConfigError(Problem("[initial] position", f"{what}remove it")))
-    what = f"given with [[{_TABLE}]], which point masses don't attract yet; remove one of them"
+    what = f"given with [[{_TABLE}]]; point masses don't attract two bodies yet: remove one of both"
     ensure(not config.bodies, ConfigError(Problem("[[bodies]]", what)))
-    what = (
-        f"turns about another point than its centre of mass, which [[{_TABLE}]] move about; remove this key"
-    )
+    what = f"turns about another point than its centre of mass, the centre for [[{_TABLE}]]; remove this key"
     key = "reference" if config.body.center_of_mass is None else "center_of_mass"
     ensure(all(x == 0 for x in around.body.center_of_mass), ConfigError(Problem(f"[body] {key}", what)))
     for number, load in enumerate(config.loads):
-        what = (
-            f'given "{load.kind}", which would act on [body] and leave out the other body and their orbit; '
-        )
+        what = f'given "{load.kind}", which would act on [body] alone; '
         what += f"with [[{_TABLE}]] allowed: {', '.join(_ALLOWED)}"
         ensure(load.kind in _ALLOWED, around.at("loads", number).fault("kind", what))
 
@@ -630,11 +624,13 @@ def _started(fields: RigidBodyTable, around: Setting, pair: Pair | None) -> Star
     quaternion = [context.one] + [context.zero] * 3 if given is None else given[0]
     place, velocity = numbers(context, fields.position), numbers(context, fields.velocity)
     if fields.orbit is not None:
-        what = 'given without a load of kind = "mutual_gravity", by which bodies orbit; add it, or give '
+        what = (
+            'given without a load of kind = "mutual_gravity", which moves bodies on orbits; add it, or give '
+        )
         if pair is None:
             raise around.fault("orbit", f"{what}position and velocity")
         place, velocity = start_of_elements(fields.orbit, pair.strength, context)
-    what = "missing, or zero, where [body] is; give its place from there, or an orbit"
+    what = "missing, or zero, the place of [body]; give its position relative to [body], or an orbit"
     ensure(any(x != 0 for x in place), around.fault("position", what))
     return Start(place, velocity, quaternion, numbers(context, fields.angular_velocity))
 
@@ -673,12 +669,14 @@ class MutualGravity(Load):
 
     @classmethod
     def resolve(cls, fields: MutualGravityFields, around: Setting) -> MutualGravity:
-        what = f"given without [[{_TABLE}]], which it is between; add a second body, or remove this load"
+        what = (
+            f"given without [[{_TABLE}]]; it acts between two bodies: add a second body, or remove this load"
+        )
         ensure(around.config.rigid_bodies, around.fault("kind", what))
         kinds = [load.kind for load in around.config.loads[: around.number]]
         ensure(
             fields.kind not in kinds,
-            around.fault("kind", "given twice; give one, which is of all bodies"),
+            around.fault("kind", "given twice; give one for all bodies"),
         )
         return cls(fields.degree)
 
