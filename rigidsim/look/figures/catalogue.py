@@ -102,9 +102,13 @@ def _plot(axes: Axes, dataset: xarray.Dataset, plot: Plot, *, dense: bool) -> No
     if plot.log and (plot.band is not None or (plot.values > 0).any()):
         axes.set_yscale("log")
     if plot.band is not None:
-        least = np.nanpercentile(plot.values, 1) if np.isfinite(plot.values).any() else plot.band[0][0]
-        # what cancels to far less than a rounding says nothing
-        bottom = max(min(least, plot.band[0][0]), 0.02 * plot.band[0][0]) / 5
+        least, most = (
+            np.nanpercentile(plot.values, [1, 100])
+            if np.isfinite(plot.values).any()
+            else plot.band[0][[0, 0]]
+        )
+        # what cancels to far less than a rounding says nothing, unless nothing else would be seen
+        bottom = min(max(min(least, plot.band[0][0]), 0.02 * plot.band[0][0]), most) / 5
         axes.fill_between(time, bottom, plot.band[1], color="#e9edf2", lw=0, zorder=0)
         axes.set_ylim(bottom)
     if plot.steady is not None:
@@ -258,33 +262,32 @@ def compose(
     shown: Shown, curves: Sequence[str] = (), planes: Sequence[str] = (), *, facts: bool = False
 ) -> Figure:
     """A page of those panels for which there is data: curves over a common time axis, planes beside
-    them or side by side, and below these a table of the motion's own numbers, if wanted.
+    them or side by side, and below the last of these a table of the motion's own numbers, if wanted.
     """
     rows, table = shown.rows, numbers(shown.rows) if facts else []
     left, right = found_of(CURVES, curves, rows), found_of(PLANES, planes, rows)
-    row, both = bool(right and not left and not table), bool(left and (right or table))
+    row, both = bool(right and not left and not table), bool(left and right)
     below = _FACT * (len(table) + 1) if table else 0.0
     lines = _CURVE * len(left) if len(left) > 1 else 3.6 * len(left)
-    height = _ROW if row else max(lines, _PLANE * len(right) + below, 2.6)
+    stacked = _PLANE * len(right) if right else lines  # above the table
+    height = _ROW if row else max(lines, stacked + below, 2.6)
     width = max(_ROW * len(right), 6.4) if row else _WIDE if both else _NARROW
     with rc_context(STYLE):  # type: ignore[arg-type]
         figure = blank(rows, width, height)
         outer = figure.add_gridspec(1, 1 + both, width_ratios=[1.38, 1.0] if both else None)
-        grid = outer[0].subgridspec(max(len(left), 1), 1)
+        heights = [stacked or 1e-3, below or 1e-3, max(height - stacked - below, 1e-3)]
+        upper, lower, _ = outer[-1].subgridspec(3, 1, height_ratios=heights)
+        grid = (outer[0] if right else upper).subgridspec(max(len(left), 1), 1)
         for k, (name, panel) in enumerate(left):
             assert isinstance(panel, Plot)
             _curve_panel(figure, grid[k], name, panel, shown, lowest=k == len(left) - 1)
-        spare = max(height - _PLANE * len(right) - below, 1e-3)
-        heights = [_PLANE] * len(right) + [below or 1e-3, spare]
-        grid = (
-            outer[-1].subgridspec(1, len(right))
-            if row
-            else outer[-1].subgridspec(len(heights), 1, height_ratios=heights)
+        grid = (outer[-1] if row else upper).subgridspec(
+            *((1, len(right)) if row else (max(len(right), 1), 1))
         )
         for k, (_, panel) in enumerate(right):
             draw(figure.add_subplot(grid[k]), rows, panel)
         if table:
-            _table(figure.add_subplot(grid[len(right)]), table)
+            _table(figure.add_subplot(lower), table)
         figure.draw_without_rendering()  # the layout finds its sizes in this round and in drawing
     return figure
 
