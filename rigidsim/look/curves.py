@@ -181,7 +181,7 @@ def other_plots(dataset: xarray.Dataset, shown: Sequence[str]) -> list[Plot]:
     plots = [variable_plot(dataset, variable) for variable in left if variable.ndim > 1]
     for unit, columns in by_unit([variable for variable in left if variable.ndim == 1]).items():
         table, labels = np.stack([*columns.values()], axis=1), [name.replace("_", " ") for name in columns]
-        divisor, shown_unit = scaled(table, unit)
+        divisor, shown_unit = scaled(table, unit, dataset.attrs)
         title = labels[0][:1].upper() + labels[0][1:]
         plots.append(Plot(f"scalars {unit}", title, table / divisor, labels, shown_unit, place="more"))
     return plots
@@ -203,7 +203,7 @@ def variable_plot(dataset: xarray.Dataset, variable: xarray.DataArray, place: st
     named = variable.coords[dimension].values if dimension in variable.coords else range(table.shape[1])
     labels = [str(label) for label in named[: table.shape[1]]] if variable.ndim > 1 else [""]
     hues = XYZ if dimension in ("body_axis", "space_axis") else PALETTE
-    divisor, unit = scaled(table, str(variable.attrs.get("units", "")))
+    divisor, unit = scaled(table, str(variable.attrs.get("units", "")), dataset.attrs)
     wrapped = "angle" in variable.attrs and "angles_wrapped_from" in dataset.attrs
     title = name[:1].upper() + name[1:].replace("_", " ") + (" within one turn" if wrapped else "")
     return Plot(name, title, table / divisor, labels, unit, hues, place=place, recorded=divisor)
@@ -248,7 +248,7 @@ def plotted(
     options = {"name": name, "title": title, "of": of, "word": "angle", **options, **own}
     of, table = options.pop("of"), table.reshape(len(table), -1)
     options["title"] += options.pop("more", "")
-    divisor, unit = scaled(table, of)
+    divisor, unit = scaled(table, of, dataset.attrs)
     error = uncertain(dataset, table / divisor, divisor) if of == "rad" else None
     return Plot(values=table / divisor, error=error, **{"unit": unit} | options)
 

@@ -12,7 +12,7 @@ FIGURES: dict[str, str] = {
     "climate": "obliquity, climatic precession within the eccentricity, and insolation over time",
     "libration": "libration, or roll, pitch and yaw, over time; the source seen from the body",
     "pointing": "angle of a body axis from the oncoming air, or from the Sun or the planet, over time",
-    "tip": "trace of a top's tip seen from above, its tilt and precession over time",
+    "tip": "a top's centre of mass, or `[output] tip`, seen from above, its tilt and precession over time",
     "polhode": "polhode on the surfaces of energy and momentum, separatrix, Poinsot's rolling",
     "momentum_sphere": "the momentum's sphere in the body, levels of energy, stable and unstable spins",
     "rotors": "rates of the rotors, and their axes from the angular momentum, over time",

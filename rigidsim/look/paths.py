@@ -65,10 +65,12 @@ Find = Callable[[xarray.Dataset], Path | None]
 
 def planar(
     name: str, title: str, plane: Array, across: str, up: str, *, of: str = "rad",
-    others: Mapping[str, Array] | None = None, **options: Any,
+    others: Mapping[str, Array] | None = None, attributes: Mapping[str, Any] | None = None, **options: Any,
 ) -> Path:  # fmt: skip
-    """The path of a point of a plane (rows, 2), with others, in the unit that suits it."""
-    divisor, unit = scaled(plane, of)
+    """The path of a point of a plane (rows, 2), with others, in the unit that suits it, and a run with these
+    attributes.
+    """
+    divisor, unit = scaled(plane, of, attributes)
     beside = {key: path / divisor for key, path in (others or {}).items()}
     return Path(name, title, plane / divisor, across, up, unit, others=beside, **options)
 
@@ -156,10 +158,16 @@ def nutation(dataset: xarray.Dataset) -> Path:
 
 
 def tip(dataset: xarray.Dataset) -> Path:
-    """A top's tip, recorded or the end of the unit figure axis, seen from above."""
+    """The point of a top that was recorded, its centre of mass unless the config has another, or the end of
+    the unit figure axis, seen from above.
+    """
     up, points, what, unit = scene_of(dataset).vertical, signals.values(dataset, "tip", 3), "Tip", "m"
     if points is None:
         points, what, unit = need(signals.pole(dataset, "figure")), "Figure axis", ""
+    elif (arm := signals.lever(dataset)) is not None:
+        center = signals.in_space(dataset, arm)
+        if center is not None and np.allclose(points, center, atol=1e-6 * np.abs(arm).max(), equal_nan=True):
+            what = "Centre of mass"
     need(signals.is_top(dataset))
     plane = points @ _in_plane(up)
     if not unit and np.nanmax(np.abs(plane)) < _SMALL:  # components of a unit vector are angles
@@ -194,7 +202,8 @@ def sub_source(dataset: xarray.Dataset) -> Path:
 def herpolhode(dataset: xarray.Dataset) -> Path:
     """The tip of the angular velocity on the invariable plane, seen along the momentum."""
     plane, title = herpolhode_plane(dataset), "Herpolhode on the invariable plane"
-    return planar("herpolhode", title, plane, "across L", "across L", of="rad/s", center="L")
+    options: dict[str, Any] = {"of": "rad/s", "attributes": dataset.attrs, "center": "L"}
+    return planar("herpolhode", title, plane, "across L", "across L", **options)
 
 
 def herpolhode_plane(dataset: xarray.Dataset) -> Array:

@@ -26,6 +26,7 @@ ASTRONOMICAL_UNIT = 149597870700.0  # m
 _LONG = ((1e9 * YEAR, "Gyr"), (1e6 * YEAR, "Myr"), (1e3 * YEAR, "kyr"))
 _CALENDAR = ((YEAR, "yr"), (DAY, "d"), (3600.0, "h"), (60.0, "min"))
 _SHORT = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"), (1e-12, "ps"), (1e-15, "fs"))
+_MOST_ANGLE = 20.0  # rad in a unit of time, beyond which a rate doesn't read as an angle
 _CLOSE = 1 + 1e-9  # a span this near below a unit counts as one
 
 
@@ -249,7 +250,7 @@ def largest(values: Array) -> float:
 def scaled(values: Array, unit: str, attributes: Mapping[str, Any] | None = None) -> tuple[float, str]:
     """Divisor and name of the unit in which values read best: prefixes for rates and lengths, degrees,
     arcseconds, mas and less for angles, and with a run's attributes its unit of time: for times, and for
-    rates, which are then angles a day or a year.
+    rates, which are then angles a year or a day, if these are below `_MOST_ANGLE`.
     """
     unit, size = pretty_unit(unit), largest(values)
     if unit == "rad":
@@ -258,9 +259,10 @@ def scaled(values: Array, unit: str, attributes: Mapping[str, Any] | None = None
         time = unit_of(attributes, size if unit == "s" else 0.0)
         if unit == "s":
             return time.seconds, time.symbol
-        if time.seconds >= DAY:
-            divisor, name = _angle_scale(size * time.seconds)
-            return divisor / time.seconds, f"{name}/{time.symbol}"
+        for per in (time, TimeUnit("day", DAY)) if time.seconds >= DAY else ():
+            if size * per.seconds <= _MOST_ANGLE:
+                divisor, name = _angle_scale(size * per.seconds)
+                return divisor / per.seconds, f"{name}/{per.symbol}"
     if unit not in _PREFIXED or size == 0 or 0.1 <= size < 1e3:
         return 1.0, unit
     exponent = 3 * math.floor(math.log10(size) / 3 + 1e-9)

@@ -144,7 +144,7 @@ def phases(dataset: xarray.Dataset) -> Panel:
     table, options = need(curves.swings(dataset) or curves.regular(dataset))
     names = options["labels"]
     rate = np.gradient(table, signals.seconds(dataset), axis=0)
-    (scale, unit), (speed, speed_unit) = scaled(table, "rad"), scaled(rate, "rad/s")
+    (scale, unit), (speed, speed_unit) = scaled(table, "rad"), scaled(rate, "rad/s", dataset.attrs)
 
     def drawn(axes: Axes) -> None:
         for x, y, name, hue in zip((table / scale).T, (rate / speed).T, names, style.PALETTE, strict=False):
@@ -162,7 +162,7 @@ def locking_phases(dataset: xarray.Dataset) -> Panel:
     rate = dataset["angular_velocity"].values @ scene_of(dataset).figure
     middle, rate = float(np.mean(longitude[found.last])), rate - np.mean(rate[found.last])
     rest = slice(int(np.argmax(np.abs(longitude - middle) < 2 * np.pi * _LAST_TURNS)), None)
-    speed, unit = scaled(rate[rest], "rad/s")
+    speed, unit = scaled(rate[rest], "rad/s", dataset.attrs)
     # within half a turn of where it ends, that between -45 and 315 degrees
     centre = np.remainder(middle + np.pi / 4, 2 * np.pi) - np.pi / 4
     within = np.degrees(np.remainder(longitude[rest] - middle + np.pi, 2 * np.pi) - np.pi + centre)

@@ -215,7 +215,7 @@ def polhode(dataset: xarray.Dataset) -> Draw:
 
 def _polhode(axes: Axes, dataset: xarray.Dataset, rates: Array) -> None:
     found, moments = surfaces(dataset), scene_of(dataset).moments
-    scale, unit = scaled(rates if found is None else np.concatenate(found), "rad/s")
+    scale, unit = scaled(rates if found is None else np.concatenate(found), "rad/s", dataset.attrs)
     names = [f"$ω_{name}$" for name in signals.axis_names(dataset)]
     points = from_start(dataset, rates / scale)
     if found is None or moments is None:

@@ -39,6 +39,7 @@ _FILLED = 2.0  # area of a sphere's dots over its map's area
 _STILL = 1e-9  # variation between members or components, relative to the largest, that is rounding
 _NOISE = 1e-12  # of a signal's own size, below which a line or a secular rate is rounding
 _MOST_SHOWN, _CROWDED, _LONGEST = 12, 60, 24  # values shown at their ticks, their letters, and letters of one
+_FEW = 5.0  # per cent of a map's values that are left out of its logarithmic scale
 _DECADES = 1.5  # from which on values of one sign have a logarithmic scale
 _FEWEST = 12  # directions that make a map
 _MOST_PANELS, _COLUMNS, _PANEL = 14, 2, 1.75  # of fits; inches high
@@ -267,18 +268,26 @@ def _map(axes: Axes, variable: xarray.DataArray, kept: list[Axis], title: str) -
     missing = "" if np.isfinite(variable).all() else " (grey: no value)"
     bar = {"label": _named(variable), **_BAR}
     options: dict[str, Any] = {"rasterized": True, "add_labels": False, "cbar_kwargs": bar}
-    variable.plot.pcolormesh(x=kept[0].dim, y=kept[1].dim, ax=axes, **options, **_colours(variable.values))
+    colours = _colours(variable.values)
+    if isinstance(colours["norm"], LogNorm):  # lower values have its lowest colour
+        variable = variable.clip(min=colours["norm"].vmin, keep_attrs=True)
+    variable.plot.pcolormesh(x=kept[0].dim, y=kept[1].dim, ax=axes, **options, **colours)
     axes.grid(visible=False)
     titled(axes, title + missing)
 
 
 def _colours(values: Array) -> dict[str, Any]:
     """Scale of a map's colours, logarithmic if values span decades, and the ends beyond which some lie: of
-    many, a hundredth of the values at the ends doesn't take the colours from all others.
+    many, a hundredth of the values at the ends doesn't take the colours from all others, nor do some that are
+    no more than zero keep them from a logarithmic scale.
     """
     finite = values[np.isfinite(values)] if np.isfinite(values).any() else np.array([0.0, 1.0])
     low, high = np.percentile(finite, [0.5, 99.5] if len(finite) >= _MANY else [0, 100])
-    decades = spans_decades(values)
+    least = float(np.percentile(finite, _FEW)) if len(finite) >= _MANY else 0.0
+    if finite.min() <= 0 < least and (decades := spans_decades(np.maximum(finite, least))):
+        low = least
+    else:
+        decades = spans_decades(values)
     if not decades and (high - low < 0.5 * np.ptp(finite) or low == high):  # few different values
         low, high = finite.min(), max(finite.max(), np.nextafter(finite.min() + 1.0, -np.inf))
     beyond = int((finite < low).any()) + 2 * int((finite > high).any())

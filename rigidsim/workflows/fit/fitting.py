@@ -342,6 +342,9 @@ def result_of(
     }
     attributes = {"title": f"fit of {name}", "kind": KIND, "converged": int(made.converged)}
     attributes |= {key: getattr(made, key) for key in ("chi_square", "freedom", "derivatives", "sentence")}
+    made._experiment = keys.fitted(values)
+    if (unit := made.experiment.config.time.unit) is not None:
+        attributes["time_unit"] = unit
     dataset = xarray.Dataset(variables, coordinates, attributes)
     for readings, kept, residuals in sets:
         dataset = dataset.merge(_residuals_of(readings, kept, residuals))
@@ -357,7 +360,6 @@ def result_of(
         return np.asarray(found)
 
     made._dataset = dataset.merge(_along(along, spread, keys))
-    made._experiment = keys.fitted(values)
     return made
 
 
