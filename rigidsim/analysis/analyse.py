@@ -9,7 +9,7 @@ import numpy as np
 import xarray
 
 from rigidsim.analysis.decomposition import amplitude_spectrum, at_nyquist, decompose
-from rigidsim.analysis.labels import SECULAR, Known, Label, label, reversed_label, settled
+from rigidsim.analysis.labels import SECULAR, Known, Label, Pairs, label, reversed_label, settled
 from rigidsim.analysis.result import Analysis, SignalAnalysis, SpectralLine
 from rigidsim.analysis.signals import EquidistantTimes, Signal, clock_of, signals_of
 from rigidsim.errors import RigidsimError
@@ -169,7 +169,7 @@ def _labelled(
     known: Sequence[Known],
     faster: bool,
     in_body: bool,
-    secular: Sequence[str],
+    secular: Pairs,
 ) -> SignalAnalysis:
     """The analysis with labels of its lines, and notes."""
     weakest = _FIRST_ORDER * max((line.amplitude for line in found.lines), default=0.0)
@@ -232,7 +232,7 @@ def _named(
     clock: EquidistantTimes,
     known: Sequence[Known],
     in_body: bool,
-    secular: Sequence[str],
+    secular: Pairs,
 ) -> SpectralLine:
     """A line with its label, unfolded through that."""
     context, error, resolution = clock.context, line.frequency_error, 2 * math.pi / float(clock.length)

@@ -7,7 +7,7 @@ nearly as simple.
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -52,9 +52,11 @@ class Known:
     kind: str = ""
 
 
-SECULAR = {
-    "obliquity": ("ks",), "precession": ("ks",), "climatic_precession": ("kg",),
-    "orbit_eccentricity": ("gg",), "insolation": ("kg", "ks"),
+Pairs = Sequence[tuple[str, str]]
+_KS, _KG, _GG = ("k", "s"), ("k", "g"), ("g", "g")
+SECULAR: Mapping[str, Pairs] = {
+    "obliquity": [_KS], "precession": [_KS], "climatic_precession": [_KG], "orbit_eccentricity": [_GG],
+    "insolation": [_KG, _KS],
 }  # fmt: skip
 """First-order terms of variables, by the kinds of both frequencies: sums of k and another, differences of two
 g (Laskar et al. 2004, A&A 428, 261, equations 35 to 40).
@@ -119,7 +121,7 @@ def label(
     in_body: bool = False,
     blend: float = 0.0,
     resolution: float = math.inf,
-    secular: Sequence[str] = (),
+    secular: Pairs = (),
 ) -> Label:
     """Find the combination that a line represents, observed within +-nyquist, rad/s.
 
@@ -151,7 +153,7 @@ def _vectors(seen: Sequence[int], count: int) -> NDArray[np.int64]:
     return vectors
 
 
-def _pairs(known: Sequence[Known], secular: Sequence[str]) -> NDArray[np.int64] | None:
+def _pairs(known: Sequence[Known], secular: Pairs) -> NDArray[np.int64] | None:
     """Combinations of two secular frequencies of these kinds; None if there are none."""
     unit = np.eye(len(known), dtype=np.int64)
     found = [

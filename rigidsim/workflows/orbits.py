@@ -162,10 +162,10 @@ def write_orbits(
                 show.update(share, f"{100 * share:.1f} %, t = {reached / 1000:,.6g} kyr, {left}")
         except KeyboardInterrupt:
             complete = False
-        means = dict(zip(names, (axes / max(rows, 1)).tolist(), strict=True))
-        for file, axis in zip(opened, means.values(), strict=True):
+        about = dict(zip(names, (axes / max(rows, 1)).tolist(), strict=True))
+        for file, axis in zip(opened, about.values(), strict=True):
             file.write(f"# mean semi-major axis {axis:.10f} au\n")
-    return Orbits(files, rows, reached, means, complete)
+    return Orbits(files, rows, reached, about, complete)
 
 
 def _seconds(option: str, given: Any) -> float:
