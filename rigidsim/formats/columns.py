@@ -2,7 +2,7 @@
 
 | tool | columns |
 | --- | --- |
-| TUM, EuRoC | ``tx ty tz qx qy qz qw``; ``p_RS_R_x``, ``q_RS_w``, ``v_RS_R_x`` |
+| EuRoC | ``p_RS_R_x``, ``q_RS_w``, ``v_RS_R_x`` |
 | ROS | ``field.pose.orientation.x``, ``field.twist.twist.angular.x``, ``pose/position/x`` |
 | MuJoCo | ``qpos_0`` ... ``qpos_6`` and ``qvel_0`` ... ``qvel_5`` of a free joint, four and three of a ball |
 | Basilisk | ``sigma_BN_0``, ``omega_BN_B_0``, ``r_BN_N_0``, ``v_BN_N_0`` |
@@ -64,11 +64,16 @@ _TOOLS: dict[str, list[tuple[str, Sequence[str]]]] = {
     ],
     POSITIONS: [
         *((rf"[rp]_{_FRAMES}", letters) for letters in _VECTORS),
-        ("(?:position_|translation_|t)", "xyz"), ("qpos_?", "012"), ("", "xyz"),
+        ("(?:position_|translation_)", "xyz"), ("qpos_?", "012"), ("", "xyz"),
     ],
     VELOCITIES: [*((rf"v_{_FRAMES}", letters) for letters in _VECTORS), ("qvel_?", "012"), ("v", "xyz")],
 }  # fmt: skip
 """The same of tools, behind any prefix, such as a message's or a body's."""
+_ORDER = (
+    (QUATERNION, False), (MATRIX, False), (QUATERNION, True), (ANGLES, False), (MRP, True), (VECTOR, True),
+    *((kind, tools) for kind in (RATES, POSITIONS, VELOCITIES) for tools in (False, True)),
+)  # fmt: skip
+"""What is looked for one after the other, and whether as tools name it."""
 _WHOLE = {("qpos_?", "0123"), ("qvel_?", "012")}
 """Of joints: the columns of a ball joint, none beyond; beside a free joint's they are something else."""
 _OTHERS = re.compile(r"(.*_)?(bias|std|sigma|cov|covariance|err|error|ref|des|desired|cmd|target|goal)")
@@ -96,31 +101,22 @@ def columns_of(names: Iterable[str]) -> dict[str, Columns]:
     """
     by_plain = {plain(name): name for name in names}
     found: dict[str, Columns] = {}
-
-    def add(kind: str, chosen: list[str], letters: str = "") -> None:
-        if chosen and not {*chosen} & {name for one in found.values() for name in one.names}:
-            found[kind] = Columns([by_plain[name] for name in chosen], letters)
-
-    def attitude() -> bool:
-        return any(kind in found for kind in ATTITUDES)
-
-    for kind in (QUATERNION, MATRIX):
-        if not attitude():
-            add(kind, next(filter(None, (_components(by_plain, *form) for form in _PLAIN[kind])), []))
-    body = ""
-    for kind in (QUATERNION, ANGLES, MRP, VECTOR):
-        if not attitude() and kind == ANGLES:
-            add(kind, next(filter(None, (_components(by_plain, *form) for form in _PLAIN[kind])), []))
-        elif not attitude():
-            body, chosen = _of_tool(by_plain, kind, None)
-            add(kind, chosen, "wxyz" if kind == QUATERNION else "")
-    for kind in (RATES, POSITIONS, VELOCITIES):
-        add(kind, next(filter(None, (_components(by_plain, *form) for form in _PLAIN[kind])), []))
-        if kind not in found:
-            add(kind, _of_tool(by_plain, kind, body)[1])
-    if QUATERNION in found and not found[QUATERNION].letters:
-        ends = "".join(re.sub(_SUFFIX + "$", "", plain(name))[-1:] for name in found[QUATERNION].names)
-        found[QUATERNION] = Columns(found[QUATERNION].names, ends if ends == "wxyz" else "")
+    body: str | None = None
+    for kind, tools in _ORDER:
+        if kind in found or (kind in ATTITUDES and any(one in found for one in ATTITUDES)):
+            continue
+        letters = ""
+        if tools:
+            known = body if kind in ATTITUDES else body or ""
+            prefix, chosen = _of_tool(by_plain, kind, known)
+            body, letters = prefix if chosen and body is None else body, "wxyz" * (kind == QUATERNION)
+        else:
+            chosen = next(filter(None, (_components(by_plain, *form) for form in _PLAIN[kind])), [])
+            ends = "".join(re.sub(_SUFFIX + "$", "", name)[-1:] for name in chosen)
+            letters = ends if kind == QUATERNION and ends == "wxyz" else ""
+        named = [by_plain[name] for name in chosen]
+        if named and not {*named} & {name for one in found.values() for name in one.names}:
+            found[kind] = Columns(named, letters)
     return found
 
 

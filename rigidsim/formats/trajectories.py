@@ -51,7 +51,7 @@ _XARRAY = {".nc", ".nc4", ".cdf", ".h5", ".hdf5", ".zarr"}
 _MOST_COLUMNS = 500
 _NORM = 0.05  # by which quaternions of a table without names may differ from norm 1
 _BLOCK = 65_536  # rows of a text that are held as words
-_UNNAMED = {8: "timestamp tx ty tz qx qy qz qw"}
+_UNNAMED = {8: "timestamp x y z qx qy qz qw"}
 """Columns of tables without names, by their number: TUM's."""
 _OF_42 = {"time": ("time",), "qbn": ("qx", "qy", "qz", "qw"), "wbn": ("wx", "wy", "wz"),
           "PosN": ("x", "y", "z"), "VelN": ("vx", "vy", "vz")}  # fmt: skip
