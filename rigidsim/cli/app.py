@@ -442,8 +442,11 @@ def tradeoff(
 def export(
     run_path: options.RunPath,
     file_format: Annotated[
-        str, options.option("--format", "FORMAT", f"{', '.join(FORMATS[:-1])} or {FORMATS[-1]}.")
-    ],
+        str | None,
+        options.option(
+            "--format", "FORMAT", f"{', '.join(FORMATS[:-1])} or {FORMATS[-1]}; default: --out's."
+        ),
+    ] = None,
     out: Annotated[
         Path | None, options.option("--out", "PATH", "Default NAME.FORMAT in this folder.")
     ] = None,

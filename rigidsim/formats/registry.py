@@ -106,6 +106,19 @@ the extra that brings it.
 """
 
 
+_SUFFIXES = {".bc": "ck", ".bpc": "pck", ".pqt": "parquet"}
+
+
+def format_of(out: str | Path | None) -> str:
+    """The name of the format that a file's suffix asks for."""
+    suffix = Path(out or "").suffix.lower()
+    name = _SUFFIXES.get(suffix, suffix[1:])
+    if name not in FORMATS:
+        given = f'given "{out}", whose suffix is no format' if out is not None else "missing"
+        raise RigidsimError(f"--format: {given}; allowed: {', '.join(FORMATS)}, or --out with such a suffix")
+    return name
+
+
 def format_named(name: str) -> Format:
     """A format by its name; its module, and the package that it needs, are loaded."""
     if name not in FORMATS:

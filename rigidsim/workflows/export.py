@@ -9,7 +9,7 @@ import xarray
 from rigidsim.errors import RESUME, RigidsimError, RunFolderError
 from rigidsim.formats import FOR_SWEEPS
 from rigidsim.formats.digits import angle_unit_named
-from rigidsim.formats.registry import Naming, TableSource, format_named
+from rigidsim.formats.registry import Naming, TableSource, format_named, format_of
 from rigidsim.formats.tables import BLOCK_NUMBERS, tables_of
 from rigidsim.scene.arithmetic import working_bits
 from rigidsim.scene.parts_of_values import parts_in
@@ -24,7 +24,7 @@ _PART_BITS = 53  # bits of a double: a value held by n of them has at most n tim
 
 def export(
     saved: SavedRun | SavedSweep | str | Path,
-    file_format: str,
+    file_format: str | None = None,
     out: str | Path | None = None,
     *,
     force: bool = False,
@@ -38,7 +38,8 @@ def export(
 
     Args:
         saved: a run or a sweep, or the path of one.
-        file_format: one of ``rigidsim.formats.FORMATS``; csv, parquet or zarr of a sweep.
+        file_format: one of ``rigidsim.formats.FORMATS``, by default that of the suffix of ``out``; csv,
+            parquet or zarr of a sweep.
         out: the file (for zarr the folder); ``NAME.FORMAT`` in the working folder by default (``NAME.bc`` and
             its clock ``NAME.tsc`` for ck, ``NAME.bpc`` and its frame ``NAME.tf`` for pck). In csv and
             parquet, events and Lyapunov estimates go to further files next to it, ``NAME.flip.csv``; of a
@@ -50,6 +51,7 @@ def export(
         variables: names of the variables to write; all by default. For the same formats.
         block_numbers: numbers of a sweep held in memory at once; no digit depends on it.
     """
+    file_format = file_format or format_of(out)
     found = format_named(file_format)
     if isinstance(saved, str | Path):
         saved = open_saved(saved)

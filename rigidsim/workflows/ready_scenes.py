@@ -19,7 +19,8 @@ SUBJECTS: Mapping[str, tuple[str, ...]] = {
         "torque", "magnet",
     ),
     "Free rotation": (
-        "asymmetric_top", "free_symmetric_top", "intermediate_axis", "tossed_plate", "square_plate_corner",
+        "asymmetric_top", "free_symmetric_top", "intermediate_axis", "tossed_plate", "wobbling_coin",
+        "square_plate_corner",
         "damped_top", "tumbling_planet", "water_molecule",
     ),
     "Tops": (
@@ -34,10 +35,12 @@ SUBJECTS: Mapping[str, tuple[str, ...]] = {
     "Wheels, pointing, and mass that moves": (
         "intermediate_axis_with_wheel", "dual_spin_turn", "pointing_law", "pointing_with_wheels",
         "nadir_pointing",
-        "detumbling_by_magnetorquers", "cubesat_with_hysteresis_rods", "slosh", "skater", "rocket_coning",
+        "detumbling_by_magnetorquers", "cubesat_with_hysteresis_rods", "momentum_dumping",
+        "slosh", "skater", "rocket_coning",
     ),
     "The Earth, the Moon and other bodies": (
         "earth_free_nutation", "earth_free_nutation_axes", "earth_free_core_nutation",
+        "earth_chandler_wobble",
         "earth_precession_averaged",
         "earth_moon_sun", "moon_cassini_state", "moon_mean_axis", "young_moon", "mars_precession",
         "mars_with_table",
@@ -59,11 +62,12 @@ ALIASES: Mapping[str, str] = {
     "bdot": "detumbling_by_magnetorquers",
     "boom": "gravity_gradient_boom",
     "cassini": "moon_cassini_state",
-    "chandler": "earth_free_nutation",
+    "chandler": "earth_chandler_wobble",
     "dart": "didymos_after_dart",
     "dzhanibekov": "intermediate_axis",
     "euler": "asymmetric_top",
     "feynman": "tossed_plate",
+    "flat_spin_recovery": "dual_spin_turn",
     "goryachev": "goryachev_chaplygin_top",
     "hyperion": "hyperion_map",
     "kovalevskaya": "kovalevskaya_top",

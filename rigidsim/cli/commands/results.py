@@ -37,7 +37,7 @@ def analyse(
 
 
 def export(
-    run_path: Path, file_format: str, out: Path | None, force: bool, angle_unit: str | None,
+    run_path: Path, file_format: str | None, out: Path | None, force: bool, angle_unit: str | None,
     epoch: str | None, axes: str | None, object_name: str | None, object_id: str | None,
     message: str | None, variable: list[str] | None,
 ) -> None:  # fmt: skip
