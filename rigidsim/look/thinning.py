@@ -103,7 +103,7 @@ def _thinned(
     along = {str(n): v for n, v in dataset.data_vars.items() if "time" in v.dims and v.dtype.kind in "fiub"}
     wanted = dataset[[name for name, variable in along.items() if "residual_of" not in variable.attrs]]
     # A slice is a strided read in HDF5; a list of indices would be read index by index.
-    ends = wanted.isel(time=slice(count - 1, count if (count - 1) % stride else 0))
+    ends = wanted.isel(time=slice(count - 1 if (count - 1) % stride else count, count))
     plain, shown = dict[Hashable, xarray.Variable](), dict[Hashable, xarray.Variable]()
     for name, variable in wanted.variables.items():
         plain[name] = variable

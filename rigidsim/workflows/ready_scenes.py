@@ -52,7 +52,9 @@ SUBJECTS: Mapping[str, tuple[str, ...]] = {
         "apophis_2029",
     ),
     "Fits to observations: rigidsim fit": ("toutatis_1992",),
-    "Sweeps: rigidsim sweep": ("first_flip", "flip_sphere", "hyperion_map", "apophis_flyby", "round_off"),
+    "Sweeps: rigidsim sweep": (
+        "first_flip", "flip_sphere", "hyperion_map", "mars_obliquities", "apophis_flyby", "round_off",
+    ),
 }  # fmt: skip
 """Names of all scenes by what they are about, the simplest first."""
 
