@@ -7,5 +7,5 @@ experiments/bare/free_body.py dense out.h5 1e5 1000001``.
 ``moon`` and ``earth`` are larger: the Moon of JPL's packages with everything that turns it, and a rigid
 Earth under Moon, Sun and planets, independent truths for rigidsim's own (``blocks`` reads the packages,
 ``mechanics`` has the torques, for numbers and expressions alike). ``experiments.real_moon`` and the tests run
-them.
+them. ``deep_time`` follows a precession through 100 million years (docs/accuracy.md).
 """

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.coverage import carried, fields, known, real_bodies, satellites
+from experiments.coverage import carried, deep_time, fields, known, real_bodies, satellites
 from experiments.coverage.hyperbolic import HYPERBOLIC, hyperbolic_average
 from experiments.coverage.moments import put_late, spike, switch
 from experiments.random_scenes import KINDS, Draw, orbit
 
 SAMPLES = 9
+DEEP_TIME = "deep time"
 _FORMULATIONS = ("quaternion", "quaternion", "rotation_matrix", "euler_angles", "canonical")
 
 
@@ -255,6 +256,7 @@ FAMILIES: dict[str, Family] = {
     "plates in air": Family(satellites.plates_in_air, (0.3, 1.7), canonical=False),
     "eddy currents": Family(satellites.eddy_currents, (1.0, 3.0), canonical=False),
     "field of the attractor": Family(satellites.attractor, (0.3, 2.0), canonical=False),
+    DEEP_TIME: Family(deep_time.precession, (3.0, 5.0), finish=deep_time.write_orbit),
 }
 """By the name under which the table shows them."""
 
@@ -287,6 +289,8 @@ def coverage_scene(number: int, seed: int = 1, name: str = "") -> CoverageScene:
         integrator.append(f"tolerance = {draw.decades(-13, -7):.3g}")
     elif kind < 0.43:
         integrator.append("hold_invariants = true")
+    if name == DEEP_TIME:  # which has states of its own, and holds none
+        integrator = [x for x in integrator[1:] if "hold" not in x] or ['precision = "double"']
     if family.averaged:
         integrator = []
     text = draw.text(f"coverage{number}", span, integrator)

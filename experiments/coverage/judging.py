@@ -10,7 +10,7 @@ import numpy as np
 
 import rigidsim
 from experiments.coverage import moments
-from experiments.coverage.families import SAMPLES, CoverageScene
+from experiments.coverage.families import DEEP_TIME, SAMPLES, CoverageScene
 from rigidsim.accuracy.reversal import there_and_back
 from rigidsim.errors import ConfigError, RigidsimError
 from rigidsim.scene.cautions import WarningCode
@@ -91,7 +91,7 @@ class Kept(SampleReceiver):
         """Keep a block, and watch it."""
         self.trail.take(block)
         recorded = self._evaluator.evaluate(block)  # type: ignore[attr-defined]
-        exact, exponent = self._prepared.precision.exact, int(math.log2(self._prepared.clock.unit))
+        exact, exponent = self._prepared.precision.exact, round(math.log2(abs(self._prepared.clock.unit)))
         self.times += [mpmath.ldexp(exact(t), exponent) for t in block.times]
         for invariant in self._prepared.system.invariants:
             self.statistics.see(invariant.name, recorded[f"{invariant.name}_drift"][0][:, 0])
@@ -113,7 +113,8 @@ class Kept(SampleReceiver):
 def judge(scene: CoverageScene) -> Judged:
     """Run a scene in memory, with its estimate, and then better."""
     start = scene.text.partition("[initial]")[2].partition("[[")[0]
-    recorded = ["quaternion"] + (["position"] if "position = " in start else [])
+    turned = "momentum_axis" if scene.family == DEEP_TIME else "quaternion"
+    recorded = [turned] + (["position"] if "position = " in start else [])
     asked = [f"output.record={recorded}".replace("'", '"')]
     begin = Judged(scene.number, scene.family, _setting(scene), "refused", scene.radians)
     try:
@@ -136,7 +137,7 @@ def judge(scene: CoverageScene) -> Judged:
         places = (float(apart(seen.exact("position"), truth["position"])), found.estimate.position or 0.0)
     return replace(
         begin,
-        true=angle(seen.exact("quaternion"), truth["quaternion"]),
+        true=angle(seen.exact(turned), truth[turned]),
         announced=math.nan if announced is None else announced,
         true_place=places[0],
         announced_place=places[1],
@@ -235,8 +236,8 @@ def _truth(
     better = [
         f'integrator.precision="{precision}"',
         'integrator.tolerance="auto"',
-        'integrator.formulation="quaternion"',
         "integrator.hold_invariants=false",
+        *(() if scene.family == DEEP_TIME else ['integrator.formulation="quaternion"']),
     ]
     try:
         found = compactly(rigidsim.parse(scene.text, overrides=[*asked, *better]))
@@ -298,12 +299,15 @@ def _integral_of_kink(end: mpmath.mpf, c: mpmath.mpf) -> mpmath.mpf:
 
 
 def angle(one: Vectors, other: Vectors) -> float:
-    """Largest between attitudes, rad, up to the quaternions' sign; a norm off 1 counts."""
+    """Largest between attitudes, rad, up to the quaternions' sign, or axes; a norm off 1 counts."""
+    sizes = (2, (1,)) if len(one[0]) == 3 else (4, (1, -1))
     with mpmath.workdps(60):
         chords = [
-            min(apart([p], [q]), apart([p], [[-x for x in q]])) for p, q in zip(one, other, strict=True)
+            min(apart([p], [[sign * x for x in q]]) for sign in sizes[1])
+            for p, q in zip(one, other, strict=True)
         ]
-        return math.pi if any(map(mpmath.isnan, chords)) else float(4 * mpmath.asin(min(max(chords) / 2, 1)))
+        lost = any(map(mpmath.isnan, chords))
+        return math.pi if lost else float(sizes[0] * mpmath.asin(min(max(chords) / 2, 1)))
 
 
 def apart(one: Vectors, other: Vectors) -> Any:

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 import xarray
+from xarray.backends import BackendArray
+from xarray.core import indexing
 
 pytest.importorskip("matplotlib")
 
@@ -33,6 +35,27 @@ def test_extremes_of_two_strides_stand_in_two_rows() -> None:
     np.testing.assert_array_equal(
         thin_with_extremes(part, 4001)[1]["angular_velocity"], part["angular_velocity"]
     )
+
+
+class OnDisk(BackendArray):
+    """An array that is read where slices ask, as of a run whose samples are in several files."""
+
+    def __init__(self, values: np.ndarray) -> None:
+        self.values, self.shape, self.dtype = values, values.shape, values.dtype
+
+    def __getitem__(self, key: indexing.ExplicitIndexer) -> np.ndarray:
+        basic, read = indexing.IndexingSupport.BASIC, self.values.__getitem__
+        return np.asarray(indexing.explicit_indexing_adapter(key, self.shape, basic, read))
+
+
+@pytest.mark.parametrize("count", [9, 10, 21, 23])
+def test_a_run_on_disk_that_goes_back_has_the_rows_of_one_in_memory(count: int) -> None:
+    whole = long_run(count)
+    lazy = indexing.LazilyIndexedArray(OnDisk(whole.angular_velocity.values))
+    back = slice(None, None, -1)
+    both = whole, whole.assign(angular_velocity=xarray.Variable(("time", "body_axis"), lazy))
+    one, other = (thin_with_extremes(x.isel(time=back), 11)[0].angular_velocity.values for x in both)
+    np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize("seed", range(6))
