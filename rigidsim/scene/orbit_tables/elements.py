@@ -15,7 +15,7 @@ hundredth of the time; elements with an anomaly, which counts millions of turns,
 
 import re
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
