@@ -166,11 +166,11 @@ def rotation_of(scene: Any) -> InitialRotation:
     if pair is not None:
         start = STARTS[pair](scene.started(start))
     what = "has a spin about the axis that has no moment of inertia, where a spin means nothing; make that "
-    ensure(not _along_massless(scene.body, start.angular_velocity), refusal(key, what + "component zero"))
+    ensure(not along_massless(scene.body, start.angular_velocity), refusal(key, what + "component zero"))
     return start
 
 
-def _along_massless(body: RigidBody, vector: Vector | None) -> bool:
+def along_massless(body: RigidBody, vector: Vector | None) -> bool:
     """Whether a vector has a part along an axis without inertia (a rod's)."""
     assert vector is not None
     axes = zip(body.principal_moments, body.principal_axes, strict=True)
@@ -227,7 +227,7 @@ def from_momentum(scene: Any) -> Vector:
     to_body = transpose(attitude.rotation_matrix(scene.quaternion))
     momentum = apply(to_body, vector(scene.context, scene.config.initial.angular_momentum))
     what = "has a part along the axis that has no moment of inertia; make that part zero"
-    ensure(not _along_massless(scene.body, momentum), refusal("angular_momentum", what))
+    ensure(not along_massless(scene.body, momentum), refusal("angular_momentum", what))
     for load in scene.loads:
         if load.inner_momentum is not None:
             momentum = minus(momentum, load.inner_momentum)

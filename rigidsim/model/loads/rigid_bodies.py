@@ -64,6 +64,7 @@ from rigidsim.scene.readable import length_text
 from rigidsim.scene.registry import LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene, whole_body
 from rigidsim.scene.schema import RigidBodyTable
+from rigidsim.scene.starts import along_massless
 from rigidsim.scene.swept import plain
 
 _TABLE = "rigid_bodies"
@@ -569,6 +570,11 @@ class SecondBody(Load):
                 figures.append(figure)
             pair = Pair((figures[0], figures[1]), degree, context)
         made = cls(fields.name, body, around.body, pair, _started(fields, around, pair), around.where(""))
+        what = (
+            "has a spin about the axis that has no moment of inertia, where a spin means nothing; make that "
+        )
+        whole = f"{what}component zero"
+        ensure(not along_massless(body, made.start.rates), around.fault("angular_velocity", whole))
         near = sum(min(axes) for axes in made.semi_axes)
         what = f"places the bodies into each other, {context.nstr(near, 6)} m and more apart are allowed"
         ensure(norm(context, made.start.position) > near, around.fault("position", what))
