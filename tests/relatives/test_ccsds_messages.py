@@ -583,6 +583,30 @@ def test_parameter_messages_are_starts_and_data(seed: int, tmp_path: Path) -> No
     assert shown.attrs["epoch"] == str(parse_epoch(f"{given.dates[0].isoformat()} {given.scale}"))
 
 
+def test_a_fit_begins_at_a_message(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    given, late = Aem(rng, "QUATERNION/ANGVEL"), Rotation.from_rotvec([1e-3, -2e-3, 1e-3])
+    given.xml = given.of_source = False
+    top, times = given.top, np.linspace(0, 5, 20)
+    top.spin = top.nutation * np.cos(top.tilt) * (1 / 1.4 - 1)
+    (tmp_path / "top.apm").write_text(apm(given))
+    begun = top.attitude(given.times[:1])
+    turned = begun * late * begun.inv() * top.attitude(given.times[0] + times)
+    rows = np.column_stack([times, np.roll(turned.as_quat(), 1, axis=1)])
+    np.savetxt(tmp_path / "it.csv", rows, delimiter=",", header="time,qw,qx,qy,qz", comments="")
+    (tmp_path / "top.toml").write_text(
+        'name = "top"\n[body]\nprincipal_moments = [1, 1, 1.4]\n[initial]\napm = "top.apm"\n[time]\nend = 6\n'
+        'samples = 2\n[fit]\nparameters = ["initial.attitude", "initial.angular_velocity"]\n[[fit.data]]\n'
+        'file = "it.csv"\nobservable = "quaternion"\nsigma = 1e-6\n'
+    )
+    with pytest.raises(rigidsim.ConfigError, match=r"initial\.angular_velocity"):  # which the message gives
+        rigidsim.fit(rigidsim.load(tmp_path / "top.toml"))
+    text = (tmp_path / "top.toml").read_text().replace(', "initial.angular_velocity"', "")
+    (tmp_path / "top.toml").write_text(text)
+    found = rigidsim.fit(rigidsim.load(tmp_path / "top.toml"))
+    assert [one.value for one in found.parameters] == pytest.approx([1e-3, -2e-3, 1e-3], abs=1e-9)
+
+
 STATE = """CCSDS_APM_VERS = 1.0
 TIME_SYSTEM = TAI
 EPOCH = 2024-061T00:00:00

@@ -573,14 +573,18 @@ class FitKeys:
         given = np.array([float(x) for x in given_attitude(self.scene).quaternion])
         quaternion = multiplied(given[None, :], of_vector(turn[None, :]))[0]
         texts = [f"initial.{name}=" for name in _ATTITUDES if getattr(initial, name) is not None]
-        if initial.spin_period is not None or initial.apm is not None:
+        along = []
+        if initial.spin_period is not None:
+            texts.append("initial.spin_period=")
+            along = [spin_rate(self.scene) * x for x in self.scene.figure.pole]
+        elif (
+            initial.apm is not None and initial.angular_velocity is None and initial.angular_momentum is None
+        ):
             along = self.scene.angular_velocity
-            if initial.spin_period is not None:
-                along = [spin_rate(self.scene) * x for x in self.scene.figure.pole]
-            rates = ", ".join(repr(float(w)) for w in along)
-            texts += ["initial.spin_period=", f"initial.angular_velocity=[{rates}]"]
         if initial.apm is not None:  # which implies them
             texts += [f'time.epoch="{self.scene.epoch}"', f'frame.axes="{self.scene.axes}"']
+        if along:
+            texts.append(f"initial.angular_velocity=[{', '.join(repr(float(w)) for w in along)}]")
         shown_values = ", ".join(repr(float(x)) for x in quaternion)
         return [*texts, f"initial.quaternion=[{shown_values}]"]
 
