@@ -11,6 +11,7 @@ import json
 import math
 from collections.abc import Sequence
 from decimal import Context, Decimal
+from functools import partial
 from pathlib import Path
 
 import mpmath
@@ -28,17 +29,7 @@ _BEGIN = {"precession": Decimal("-0.5"), "longitude_of_perihelion_of_date": Deci
 _DOUBLE, _SPARE = 17, 40  # digits
 
 
-def write_snvec(table: Table, path: Path, source: TableSource) -> None:
-    """Write the columns of snvec's solutions."""
-    _write(table, path, source, _SNVEC)
-
-
-def write_la2004(table: Table, path: Path, source: TableSource) -> None:
-    """Write the columns of La2004."""
-    _write(table, path, source, _LA2004)
-
-
-def _write(table: Table, path: Path, source: TableSource, names: Sequence[str]) -> None:
+def _write(names: Sequence[str], table: Table, path: Path, source: TableSource) -> None:
     columns = [column for name in ("time", *names) if (column := table.column(name)) is not None]
     missing = sorted({"time", *names} - {column.name for column in columns})
     if missing:
@@ -54,9 +45,9 @@ def _write(table: Table, path: Path, source: TableSource, names: Sequence[str]) 
         )
     wide = any(len(column.parts) > 1 for column in columns)
     digits = math.ceil(source.bits * math.log10(2)) + 1 if wide else _DOUBLE
-    context, start = (
-        Context(prec=digits + _SPARE),
+    start, context = (
         named_epoch(source.naming, source.attributes).since_j2000(),
+        Context(prec=digits + _SPARE),
     )
     ahead = context.divide(start.numerator, start.denominator)
     with mpmath.workdps(digits + _SPARE):
@@ -84,5 +75,5 @@ def _text(value: Decimal, digits: int, wide: bool) -> str:
     return f" {number:{digits + 8}.{digits - 1}e}"
 
 
-SNVEC = Format(write_snvec, suffix=".dat", names=("epoch",))
-LA2004 = Format(write_la2004, suffix=".asc", names=("epoch",))
+SNVEC = Format(partial(_write, _SNVEC), suffix=".dat", names=("epoch",))
+LA2004 = Format(partial(_write, _LA2004), suffix=".asc", names=("epoch",))
