@@ -24,7 +24,8 @@ _REGULAR = 0.05  # by which swings may differ that have one period
 _FROM_TO = {
     "obliquity_of_date": "obliquity", "climatic": "{}", "insolation": "insolation",
     "tilt": "tilt", "wobble": "nutation angle", "pointing": "pointing error", "roll_pitch_yaw": "{}",
-    "libration": "libration {}", "rotor_tilts": "axis of rotor {} off L",
+    "libration": "libration {}", "yaw": "yaw", "separation": "distance",
+    "rotor_tilts": "axis of rotor {} off L",
     "rotor_rates": "rate of rotor {}", "braking": "remaining {}", "core_axis": "core axis from the mantle's",
 }  # fmt: skip
 """Names of curves, and what their numbers are called."""
@@ -58,6 +59,7 @@ def leading(rows: xarray.Dataset) -> tuple[Names, Names]:
             ["rotor_tilts", "rotor_rates", "rates"],
             ["momentum_sphere", "momentum_sphere_at_end"],
         ),
+        (lambda: shows("separation"), ["yaw", "separation", "mutual_period"], []),
         (
             lambda: shows("climatic") or shows("insolation"),
             ["obliquity_of_date", "climatic", "insolation"],

@@ -409,6 +409,7 @@ KINDS: dict[str, Kind] = {
         ["longitude_libration", "latitude_libration", "locking", "libration", "roll_pitch_yaw"],
         ["nadir", "phases", "locking_phases"],
     ),
+    "pair": Kind("two rigid bodies", ["yaw", "separation", "mutual_period"]),
     "pointing": Kind("air_velocity, or nadir without libration or roll_pitch_yaw, recorded", ["pointing"]),
     "tip": Kind("a top: a body on a fixed point under uniform gravity", ["tilt", "precession"], ["tip"]),
     "polhode": Kind(_TURNS, (), ["polhode", "poinsot"]),
