@@ -262,7 +262,7 @@ def _rates_of_apm(segment: _Segment, name: str, blocks: dict[str, dict[str, str]
             for one in (own, given)
             for order in ("BA" if one.get("ATTITUDE_DIR", "").upper() == "B2A" else "AB",)
         ]
-        what = f"rates from {' to '.join(ends[1])} beside an attitude from {' to '.join(ends[0])}; write both"
+        what = f"rates from {' to '.join(ends[1])} and an attitude from {' to '.join(ends[0])}; write both"
         ensure(sorted(ends[0]) == sorted(ends[1]), segment.fault(f"{what} between the same frames"))
         along = given.get(frame, "")
         if re.fullmatch(r"(EULER|REF)_FRAME_[AB]", along.upper()):

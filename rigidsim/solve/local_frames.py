@@ -62,7 +62,7 @@ def _source(scene: Scene) -> Load:
 def _normal(scene: Scene, place: Vector) -> Vector:
     """A normal of any length (mpf, space axes)."""
     if scene.config.initial.relative_to == "ned":
-        what = "space Z is the pole of the ecliptic, and north is that of the equator; set [frame] axes to "
+        what = "space Z is the pole of the ecliptic, and north is the equator's; set [frame] axes to "
         ensure(scene.axes != ECLIPTIC, _refused(scene, what + '"EME2000", or take "lvlh"'))
         return [-place[1], place[0], 0 * place[2]]
     plane = plane_of(_source(scene))

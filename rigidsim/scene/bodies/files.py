@@ -52,7 +52,7 @@ def moments_of(path: Path) -> str:
     """
     if path.suffix.lower() not in _MESHES:
         kinds = ", ".join((*_MESHES, *_XML))
-        raise ValueError(f"its suffix {path.suffix!r} is that of no mesh or robot; allowed: {kinds}")
+        raise ValueError(f"its suffix {path.suffix!r} names no mesh or robot; allowed: {kinds}")
     try:
         import trimesh
     except ImportError:
