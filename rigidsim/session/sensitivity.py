@@ -28,6 +28,12 @@ NAMES = {
     "attitude_sensitivity": ("space_axis", "rad", "attitude, as a rotation vector", "space axes"),
     "angular_velocity_sensitivity": ("body_axis", "rad s-1", "angular velocity", "body axes"),
     "position_sensitivity": ("space_axis", "m", "position", "space axes"),
+    "rigid_body_attitude_sensitivity": (
+        "space_axis",
+        "rad",
+        "second body's attitude, likewise",
+        "space axes",
+    ),
 }
 """Dimension besides the parameter's, unit for one SI unit of a key, what is differentiated, and its frame."""
 
@@ -42,7 +48,7 @@ def sensitivity_variables(prepared: InitialValueProblem) -> list[Variable]:
     labels = {"parameter": [key.name for key in keys]}
     found = []
     for name, (axes, unit, what, frame) in NAMES.items():
-        if name == "position_sensitivity" and not prepared.scene.free_flight:
+        if name not in _names(prepared):
             continue
         attributes = {
             "units": unit,
@@ -55,6 +61,13 @@ def sensitivity_variables(prepared: InitialValueProblem) -> list[Variable]:
     return found
 
 
+def _names(prepared: InitialValueProblem) -> list[str]:
+    """Which of ``NAMES`` a motion has; the position is the second body's where the first has none."""
+    without = set() if prepared.system.flown else {"position_sensitivity"}
+    without |= set() if prepared.scene.config.rigid_bodies else {"rigid_body_attitude_sensitivity"}
+    return [name for name in NAMES if name not in without]
+
+
 class Sensitivity:
     """The second integrator of a run, as a part of its checkpoints."""
 
@@ -64,7 +77,7 @@ class Sensitivity:
         self._precision = prepared.precision
         self._engine = interruptible(lambda: KeyTangents(prepared.parametrised, prepared.precision))
         self._tangents = self._engine.tangents
-        self._flies = prepared.scene.free_flight
+        self._names = _names(prepared)
         self._settled = SettledStates.of(prepared.system, self._engine.system, prepared.precision)
         shift = prepared.system.scaling.time - self._engine.system.scaling.time
         self._unit = prepared.precision.of_double(2.0**shift)
@@ -106,11 +119,14 @@ class Sensitivity:
     def _columns(self, rows: Rows | None, count: int) -> Columns:
         found = {}
         if rows is not None:
-            found["attitude_sensitivity"] = turned(rows.values["quaternion"], rows.slopes["quaternion"])
             found["angular_velocity_sensitivity"] = rows.slopes["angular_velocity"]
-            found["position_sensitivity"] = rows.slopes.get("position", np.zeros(0))
+            for prefix in ("", "rigid_body_"):
+                if (place := rows.slopes.get(f"{prefix}position")) is not None:
+                    found["position_sensitivity"] = place
+                if (q := rows.values.get(f"{prefix}quaternion")) is not None:
+                    found[f"{prefix}attitude_sensitivity"] = turned(q, rows.slopes[f"{prefix}quaternion"])
         columns: Columns = {}
-        for name in [name for name in NAMES if self._flies or name != "position_sensitivity"]:
+        for name in self._names:
             shape, more = (count, 3 * self._engine.keys), self._precision.part_count - 1
             columns[name] = [np.full(shape, np.nan), *(np.zeros(shape) for _ in range(more))]
             parts = self._precision.parts(found[name].reshape(-1)) if found else []

@@ -300,6 +300,7 @@ def _of_motion(experiment: Experiment, more: Sequence[str]) -> Experiment:
     config = experiment.config
     record = ["quaternion", "angular_velocity", *(state.name for state in config.states)]
     record += ["position", "velocity"] if config.initial.flies else []
+    record += ["rigid_body_position", "rigid_body_quaternion"] if config.rigid_bodies else []
     record += ["rotor_rate"] if config.rotors else []
     record += ["core_angular_velocity"] if config.body.core is not None else []
     record += [name for name in more if name not in record]

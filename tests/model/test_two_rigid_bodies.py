@@ -551,3 +551,25 @@ def test_classes_of_attitude_stability_are_those_published(case: tuple[float, fl
     seen = np.einsum("ti,tik->tk", n, z)  # the orbit's normal in body axes
     roll = np.degrees(np.abs(np.arctan2(seen[:, 1], seen[:, 2])))
     assert (roll.max() > 170) if rolls else (roll.max() < 1)
+
+
+def test_derivatives_by_keys_of_both_bodies_are_those_of_neighbouring_runs() -> None:
+    keys, steps = (
+        ["rigid_bodies[0].velocity[1]", "rigid_bodies[0].mass", "body.semi_axes[0]"],
+        (1e-6, 1e4, 1e-3),
+    )
+    start = "velocity = [0, 0.1714, 0.001]\nangular_velocity = [0, 1e-7, 1.46e-4]"
+    text = didymos(DIMORPHOS + start, time="end = 1e5\nsamples = 3")
+    data = loaded(run_text(text, f"output.sensitivity={keys}".replace("'", '"')))
+    values = (0.1714, 4.8e9, 425.0)
+    for n, (key, value, step) in enumerate(zip(keys, values, steps, strict=True)):
+        low, high = (loaded(run_text(text, f"{key}={value + way * step!r}")) for way in (-1, 1))
+        apart = (high["rigid_body_position"] - low["rigid_body_position"]).values[-1, 0] / (2 * step)
+        found = data["position_sensitivity"].values[-1, n]
+        np.testing.assert_allclose(found, apart, rtol=0, atol=1e-5 * np.linalg.norm(apart))
+        for prefix in ("", "rigid_body_"):
+            one, other = (matrices(x[f"{prefix}quaternion"].values.reshape(-1, 4)[-1]) for x in (low, high))
+            turn = (other - one) @ one.T / (2 * step)
+            vector = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2
+            found = data[f"{prefix}attitude_sensitivity"].values[-1, n]
+            np.testing.assert_allclose(found, vector, rtol=0, atol=1e-4 * np.linalg.norm(vector) + 1e-13)
