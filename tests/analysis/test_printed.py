@@ -49,3 +49,18 @@ def test_an_angle_is_printed_in_the_unit_that_fits_it(
     mean = re.search(r" tilt (\S+) (\S+) at mid-span", printed(angle, "tilt", {}, capsys))
     assert mean is not None
     assert (float(mean[1]), mean[2]) == (pytest.approx(value, rel=1e-9), unit)
+
+
+def test_a_line_is_printed_with_the_digits_that_noise_leaves(capsys: pytest.CaptureFixture[str]) -> None:
+    """30 arcsec, noise of 0.1: some 0.01 arcsec and 0.02 deg are uncertain, and no digit beyond is shown."""
+    day = np.arange(400)
+    noise = 0.1 * np.random.default_rng(1).standard_normal(400)
+    angle = np.pi / 648000 * (30 * np.cos(2 * np.pi * day / 20 + 0.5) + noise)
+    row = re.search(
+        r"amplitude, arcsec phase, deg line \W+\S+ d \S+ \S+ (\S+) (\S+)", printed(angle, "tilt", {}, capsys)
+    )
+    assert row is not None
+    assert [len(x.replace(".", "")) for x in row.groups()] == [5, 5]
+    assert float(row[1]) == pytest.approx(30, abs=0.03)
+    # the frequency errs by some 1e-10 rad/s, over 200 days from the middle of the samples
+    assert float(row[2]) == pytest.approx(np.degrees(0.5), abs=0.3)
