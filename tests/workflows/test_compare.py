@@ -97,8 +97,8 @@ def test_a_file_is_read_as_a_run(tmp_path: Path) -> None:
         _ = open_any(path).dataset
 
 
-def test_without_rates_the_missing_acceleration_is_told(experiment: rigidsim.Experiment) -> None:
-    """What brakes the experiment's body and not theirs, at rows of unequal distances."""
+def test_the_missing_acceleration_is_told(experiment: rigidsim.Experiment) -> None:
+    """What brakes the experiment's body and not theirs: at rows of unequal distances, and with rates."""
     braked = experiment.having(['loads=[{kind="viscous_torque",coefficients=[0.001,0.001,0.001]}]'])
     times, q, w = theirs()
     kept = np.sort(np.random.default_rng(1).permutation(len(times))[:160])
@@ -108,6 +108,10 @@ def test_without_rates_the_missing_acceleration_is_told(experiment: rigidsim.Exp
     assert found.local_defects is not None
     true = float(np.sqrt(np.mean(np.sum((0.001 * w / MOMENTS) ** 2, 1))))
     assert found.local_defects.missing_acceleration == pytest.approx(true, rel=0.1)
+    rated = rigidsim.compare(braked, {"t": times, "q": q, "w": w})
+    assert rated.verdict == "wrong_model"
+    assert rated.local_defects is not None
+    assert rated.local_defects.missing_acceleration == pytest.approx(true, rel=0.1)
 
 
 SEQUENCES = ["zxz", "zyz", "xyx", "xzx", "yxy", "yzy", "zyx", "xyz", "xzy", "yxz", "yzx", "zxy"]
