@@ -195,9 +195,12 @@ def satellite(folder: Path) -> tuple[list[Check], Panel]:
     names = {name for one in told["without"].undetermined for name in one.keys} & {*MOMENTS}
     source = "torques of a gravity gradient are as large as the moments"
     checks.append(within("satellite without its wheel: undetermined", len(names), 3, 0, source, "keys"))
-    title = "a satellite's moments by attitudes to 0.1 deg (without the wheel only their ratios show)"
+    title, below = (
+        "a satellite's moments by attitudes to 0.1 deg",
+        "orbits observed (only ratios without its wheel)",
+    )
     curves.append(Curve(None, 100, "", "grey", width=0.8))
-    return checks, Panel(title, "orbits that were observed", "sigma, % of the moment", curves, "y")
+    return checks, Panel(title, below, "sigma, % of the moment", curves, "y")
 
 
 def _turned(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:
@@ -263,6 +266,5 @@ def study(full: bool) -> Answer:
         found = [toutatis(), book(folder), satellite(folder), *([moon(folder)] if full else [])]
     checks = [check for some, _ in found for check in some]
     panels = [panel for _, panel in found]
-    return checks, Picture(
-        "What observations show of real bodies", "ab;cd" if full else "ab;c.", panels, (12, 8.5)
-    )
+    places, size = ("ab;cd", (12, 8.5)) if full else ("abc", (15, 4.6))
+    return checks, Picture("What observations show of real bodies", places, panels, size)

@@ -248,8 +248,15 @@ def pole(dataset: xarray.Dataset, axis: str) -> Array:
 
 @optional
 def steady_momentum(dataset: xarray.Dataset) -> Array:
-    """Direction (3,) of the momentum if it is fixed in space; else None."""
-    directions = finite_rows(need(pole(dataset, "momentum")))
+    """Direction (3,) of the momentum, recorded or the body's by its moments, if it is fixed in space."""
+    found = pole(dataset, "momentum")
+    if found is None:
+        scene = scene_of(dataset)
+        need(not scene.carries_within)
+        along = need(in_space(dataset, (need(principal_rates(dataset)) * need(scene.moments)) @ scene.axes))
+        with np.errstate(invalid="ignore"):
+            found = along / norms(along)[:, None]
+    directions = finite_rows(found)
     need(len(directions) > 0 and norms(directions - directions[0]).max() <= _STEADY)
     return np.asarray(directions.mean(axis=0) / np.linalg.norm(directions.mean(axis=0)))
 

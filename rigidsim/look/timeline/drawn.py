@@ -330,7 +330,7 @@ def plane_parts(plane: Path) -> list[Part]:
     found = [
         Part(f"{root}/whole", [drawn]),
         Part(f"{root}/axes", [_faint([[-end, end] for end in ends])]),
-        Part(f"{root}/axes/names", [_texts(ends, plane.labels)]),
+        Part(f"{root}/axes/names", [_texts(ends * [[0.86], [1.0]], plane.labels)]),  # within a narrow view
     ]
     angle = np.linspace(0, 2 * np.pi, 121)
     power = 10.0 ** np.floor(np.log10(plane.reach))

@@ -320,7 +320,10 @@ def build_comparison(
         common.setdefault(plot.heading, []).append(plot)
     views = [] if difference is None else [plot_view([difference], clock)]
     views += [plot_view(found, clock) for found in common.values() if found[0].place == "leading"][
-        : 4 - len(views)
+        : 2
+        - len(
+            views
+        )  # more would cut the names of six curves
     ]
     for found in (found for found in common.values() if found[0].place == "drift"):
         curves = sum(len(plot.labels) + len(plot.levels) for plot in found)
