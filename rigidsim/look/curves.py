@@ -572,9 +572,13 @@ CURVES: dict[str, Curve] = {
         "libration", "Libration: the long axis from the direction to the source",
         lambda dataset: need(swings(dataset)), word="libration", begins=True,
     ),
-    "yaw": recorded("yaw", "Yaw of the second body's long axis from the line to the first", "yaw"),
-    "separation": recorded("separation", "Distance of both bodies", "distance"),
-    "mutual_period": recorded("mutual_period", "Time of a turn at the orbit's present rate", "period"),
+    "yaw": recorded("yaw", "Yaw: second body's long axis from the line to the first", "yaw", begins=True),
+    "separation": recorded(
+        "separation", "Distance of both bodies", "distance", begins=True, hues=("violet",)
+    ),
+    "mutual_period": recorded(
+        "mutual_period", "Time of a turn at the orbit's present rate", "period", begins=True, hues=("orange",)
+    ),
     "roll_pitch_yaw": row(
         "roll_pitch_yaw", "Attitude against the local frame of the orbit",
         lambda dataset: need(regular(dataset)), begins=True,

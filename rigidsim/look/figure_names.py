@@ -11,7 +11,7 @@ FIGURES: dict[str, str] = {
     "obliquity": "obliquity and longitude of the node, less their mean or secular part",
     "climate": "obliquity, climatic precession within the eccentricity, and insolation over time",
     "libration": "libration, or roll, pitch and yaw, over time; the source seen from the body",
-    "pair": "yaw, distance and period of two rigid bodies, over time",
+    "pair": "yaw, distance and period of two rigid bodies over time; path of the second one",
     "pointing": "angle of a body axis from the oncoming air, or from the Sun or the planet, over time",
     "tip": "a top's centre of mass, or `[output] tip`, seen from above, its tilt and precession over time",
     "polhode": "polhode on the surfaces of energy and momentum, separatrix, Poinsot's rolling",

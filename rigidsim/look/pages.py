@@ -59,7 +59,7 @@ def leading(rows: xarray.Dataset) -> tuple[Names, Names]:
             ["rotor_tilts", "rotor_rates", "rates"],
             ["momentum_sphere", "momentum_sphere_at_end"],
         ),
-        (lambda: shows("separation"), ["yaw", "separation", "mutual_period"], []),
+        (lambda: shows("separation"), ["yaw", "separation", "mutual_period"], ["path"]),
         (
             lambda: shows("climatic") or shows("insolation"),
             ["obliquity_of_date", "climatic", "insolation"],
@@ -174,8 +174,9 @@ def _circling(rows: xarray.Dataset) -> Iterator[tuple[str, Array | None]]:
             "axis circles the momentum in",
             np.stack([axis @ one for one in signals.across(along)], axis=1),
         )
-    position = signals.values(rows, "position", 3)
-    if position is not None and (scene_of(rows).attractors or scene_of(rows).sources):
+    position = signals.place(rows)
+    pulled = "rigid_body_position" in rows or scene_of(rows).attractors or scene_of(rows).sources
+    if position is not None and pulled:
         normal = np.nanmean(np.cross(position[:-1], position[1:]), axis=0)
         if normal.any():
             one, other = signals.across(normal / np.linalg.norm(normal))

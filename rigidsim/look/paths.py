@@ -217,7 +217,7 @@ def flight(dataset: xarray.Dataset) -> Path:
     """The path of the centre of mass: of a body thrown seen from the side, else in its plane; None if it lies
     in none.
     """
-    position, scene = need(signals.values(dataset, "position", 3)), scene_of(dataset)
+    position, scene = need(signals.place(dataset)), scene_of(dataset)
     (scale, unit), up = scaled(position - position[0], "m"), scene.vertical
     if scene.gravity is not None and not scene.attractors:
         level = position - np.outer(position @ up, up)
@@ -233,10 +233,12 @@ def flight(dataset: xarray.Dataset) -> Path:
     need(len(spread) == 3 and spread[1] > 0 and spread[2] <= _FLAT * spread[0])
     normal = ways[2] * np.sign(ways[2, np.abs(ways[2]).argmax()])
     points, size = position @ _in_plane(normal), float(np.linalg.norm(np.ptp(position, axis=0)))
-    near = any(not any(one["position"]) for one in scene.attractors)
+    pair = "rigid_body_position" in dataset
+    near = pair or any(not any(one["position"]) for one in scene.attractors)
     center = "origin" if near and signals.norms(points).min() < size else ""
     names = ("X", "Y") if normal[2] > 1 - 1e-9 else ("across, in the plane",) * 2
-    return Path("path", "Path in its plane", points / scale, *names, unit, center=center)
+    title = "Second body, from the first" if pair else "Path in its plane"
+    return Path("path", title, points / scale, *names, unit, center=center)
 
 
 def _in_plane(normal: Array) -> Array:

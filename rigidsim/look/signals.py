@@ -83,6 +83,13 @@ def values(dataset: xarray.Dataset, name: str, width: int | None = None) -> Arra
     return found if width is None or found.shape[1:] == (width,) else None
 
 
+def place(dataset: xarray.Dataset) -> Array | None:
+    """Position (rows, 3) of a body in flight, or of the second one from the first, m."""
+    if "rigid_body_position" in dataset:
+        dataset = dataset.assign(position=dataset["rigid_body_position"].isel(rigid_body=0))
+    return values(dataset, "position", 3)
+
+
 def seconds(dataset: xarray.Dataset) -> Array:
     """Sample times (rows,), s."""
     return np.asarray(dataset["time"].values, dtype=np.float64)

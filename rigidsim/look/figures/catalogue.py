@@ -178,7 +178,7 @@ def locking_phases(dataset: xarray.Dataset) -> Panel:
 
 def flight(dataset: xarray.Dataset) -> Panel | None:
     """The path of the centre of mass, in a plane or in space."""
-    position, flat = signals.values(dataset, "position", 3), paths.flight(dataset)
+    position, flat = signals.place(dataset), paths.flight(dataset)
     if flat is not None or position is None:
         return flat
     position = from_start(dataset, position)
@@ -276,7 +276,8 @@ def compose(
         figure = blank(rows, width, height)
         outer = figure.add_gridspec(1, 1 + both, width_ratios=[1.38, 1.0] if both else None)
         heights = [stacked or 1e-3, below or 1e-3, max(height - stacked - below, 1e-3)]
-        upper, lower, _ = outer[-1].subgridspec(3, 1, height_ratios=heights)
+        column = outer[-1].subgridspec(3, 1, height_ratios=heights)
+        upper, lower = column[0], column[1]
         grid = (outer[0] if right else upper).subgridspec(max(len(left), 1), 1)
         for k, (name, panel) in enumerate(left):
             assert isinstance(panel, Plot)
@@ -409,7 +410,7 @@ KINDS: dict[str, Kind] = {
         ["longitude_libration", "latitude_libration", "locking", "libration", "roll_pitch_yaw"],
         ["nadir", "phases", "locking_phases"],
     ),
-    "pair": Kind("two rigid bodies", ["yaw", "separation", "mutual_period"]),
+    "pair": Kind("two rigid bodies", ["yaw", "separation", "mutual_period"], ["path"]),
     "pointing": Kind("air_velocity, or nadir without libration or roll_pitch_yaw, recorded", ["pointing"]),
     "tip": Kind("a top: a body on a fixed point under uniform gravity", ["tilt", "precession"], ["tip"]),
     "polhode": Kind(_TURNS, (), ["polhode", "poinsot"]),
@@ -420,7 +421,7 @@ KINDS: dict[str, Kind] = {
     ),
     "rotors": Kind("rotors whose rates were recorded", ["rotor_tilts", "rotor_rates"]),
     "herpolhode": Kind("an attitude and a constant momentum", (), ["herpolhode"]),
-    "path": Kind("position recorded", (), ["path"]),
+    "path": Kind("position, or rigid_body_position, recorded", (), ["path"]),
     "rates": Kind(_TURNS, ["rates", "spin_down", "moments"]),
     "core": Kind("rates of a fluid core and of the mantle recorded", ["core_axis", "core_slip"]),
     "published": Kind(

@@ -39,7 +39,7 @@ _FILLED = 2.0  # area of a sphere's dots over its map's area
 _STILL = 1e-9  # variation between members or components, relative to the largest, that is rounding
 _NOISE = 1e-12  # of a signal's own size, below which a line or a secular rate is rounding
 _MOST_SHOWN, _CROWDED, _LONGEST = 12, 60, 24  # values shown at their ticks, their letters, and letters of one
-_FEW = 5.0  # per cent of a map's values that are left out of its logarithmic scale
+_OUTLIERS = 5.0  # per cent of a map's values that are left out of its logarithmic scale
 _DECADES = 1.5  # from which on values of one sign have a logarithmic scale
 _FEWEST = 12  # directions that make a map
 _MOST_PANELS, _COLUMNS, _PANEL = 14, 2, 1.75  # of fits; inches high
@@ -283,7 +283,7 @@ def _colours(values: Array) -> dict[str, Any]:
     """
     finite = values[np.isfinite(values)] if np.isfinite(values).any() else np.array([0.0, 1.0])
     low, high = np.percentile(finite, [0.5, 99.5] if len(finite) >= _MANY else [0, 100])
-    least = float(np.percentile(finite, _FEW)) if len(finite) >= _MANY else 0.0
+    least = float(np.percentile(finite, _OUTLIERS)) if len(finite) >= _MANY else 0.0
     if finite.min() <= 0 < least and (decades := spans_decades(np.maximum(finite, least))):
         low = least
     else:
