@@ -99,8 +99,10 @@ class Figure:
         """To a degree, from the body's field or shape; None where neither gives degree 3 and more."""
         tensor, mass = body.inertia, body.mass
         third = (tensor[0][0] + tensor[1][1] + tensor[2][2]) / 3
-        second = [[(third if i == j else 0) - tensor[i][j] for j in range(3)] for i in range(3)]
         heaviest = context.maximum(body.principal_moments)
+        tiny = negligible(context) * heaviest  # a sphere has none
+        second = [[(third if i == j else 0) - tensor[i][j] for j in range(3)] for i in range(3)]
+        second = [[x if abs(x) > tiny else 0 * x for x in row] for row in second]
         radius = context.sqrt(heaviest / mass) if body.gravity is None else body.gravity.radius
         unit = mass * radius**2
         series = {
@@ -118,7 +120,7 @@ class Figure:
             if body.points is None:
                 return None
             series |= _of_points(body, degree, radius, context)
-        least = negligible(context) * heaviest / unit
+        least = tiny / unit
         return cls(mass, radius, {key: c for key, c in series.items() if abs(c) > least}, second)
 
 
