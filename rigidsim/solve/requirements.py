@@ -115,14 +115,17 @@ class SetAtKnots(Requirement):
 
         coming, self._entered = self.pieces.following(number), None
         knot, parameters, changes = next(coming)
+        views: tuple[np.ndarray, np.ndarray] | None = None
 
         def passed(engine: TaylorEngine) -> bool:
             """Go on in the next piece, if the step ended where it begins."""
-            nonlocal knot, parameters, changes
+            nonlocal knot, parameters, changes, views
             if engine.time != knot:
                 return False
-            self._change(engine, changes)
-            engine.pars[:] = parameters
+            views = views or (engine.pars, engine.state)
+            for series, values in changes:
+                views[1][self.places[series]] = values
+            views[0][:] = parameters
             knot, parameters, changes = next(coming)
             return True
 
