@@ -7,6 +7,7 @@ import xarray
 pytest.importorskip("matplotlib")
 
 from rigidsim.look.figures.sweeps import drawable, sweep_figure
+from rigidsim.scene.readable import scaled
 
 
 def secular(unit: str = "yr") -> xarray.Dataset:
@@ -39,3 +40,38 @@ def test_a_secular_rate_comes_before_constants_and_noise_in_the_units_of_the_con
     np.testing.assert_allclose(line.get_xdata(), tilt)
     np.testing.assert_allclose(line.get_ydata(), -7.6 * np.cos(np.deg2rad(tilt)))
     assert "energy_final" in drawable(dataset)  # still there by name
+
+
+def test_few_negative_values_leave_a_map_its_logarithmic_scale() -> None:
+    rng, (rows, columns) = np.random.default_rng(1), (30, 20)
+    table = np.where(rng.random((rows, columns)) < 0.5, 2.0, 200.0) * rng.uniform(0.9, 1.1, (rows, columns))
+    low = rng.permutation(table.size)[:12]  # 2 %
+    table.ravel()[low] = -1.0
+    keys = {"rate": "initial.angular_velocity[2]", "angle": "initial.euler_angles[2]"}
+    dataset = xarray.Dataset(
+        {"megno": (("rate", "angle"), table), "status": (("rate", "angle"), np.zeros(table.shape, np.int8))},
+        coords={
+            k: (k, np.arange(float(n)), {"swept_key": keys[k]})
+            for k, n in zip(keys, table.shape, strict=True)
+        },
+    )
+    mesh = sweep_figure(dataset, "megno").axes[0].collections[0]
+    assert mesh.norm(2.0) < 0.1
+    assert mesh.norm(20.0) == pytest.approx(0.5, abs=0.05)  # in the middle of the decades
+    assert np.ma.count_masked(mesh.get_array()) == 0  # the negative ones have the lowest colour
+    dataset["megno"][:5] = -1.0  # too many
+    assert sweep_figure(dataset, "megno").axes[0].collections[0].norm(0.0) > 0
+
+
+@pytest.mark.parametrize(
+    ("size", "time", "unit", "divisor"),
+    [
+        (2e-5, "day", "deg/day", np.pi / 180 / 86400),
+        (7.29e-5, "yr", "deg/day", np.pi / 180 / 86400),  # 360 deg a day, and 131,800 a year
+        (2.4e-7, "yr", "deg/yr", np.pi / 180 / 31557600),
+        (1.0, "day", "rad/s", 1.0),
+        (0.1, "s", "rad/s", 1.0),
+    ],
+)
+def test_rates_are_in_the_configs_unit_of_time(size: float, time: str, unit: str, divisor: float) -> None:
+    assert scaled(np.array([size]), "rad s-1", {"time_unit": time}) == (pytest.approx(divisor), unit)
