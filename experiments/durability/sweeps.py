@@ -48,7 +48,7 @@ record = ["angular_velocity"]
 keep = ["final", "series"]
 tile = 1
 axes."initial.angular_velocity[2]" = {step = [0.1, 0.1, 6], name = "w3"}
-axes."body.principal_moments[2]" = {values = [2.5, 2.75], name = "C"}
+axes."time.end" = {values = [20, -20], name = "end"}
 """
 WAYS = ("process", "process with workers", "worker", "full disk", "scheduler's worker")
 _PATIENCE = 300.0  # seconds for one child

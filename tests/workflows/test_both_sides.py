@@ -43,7 +43,9 @@ def truth(times: np.ndarray, load: str = "free", **given: Any) -> np.ndarray:
     start = np.array([1, 0, 0, 0, *given.get("rates", RATES)])
     tolerance = given.get("tolerance", 1e-13)
     for side in (times[times < 0][::-1], times[times >= 0]):
-        if len(side):
+        if len(side) and side[-1] == 0:
+            parts.append(start[None])
+        elif len(side):
             made = solve_ivp(slopes, (0, side[-1]), start, "DOP853", side, rtol=tolerance, atol=tolerance)
             parts.append(made.y.T[np.argsort(side)])
     return np.concatenate(parts)
