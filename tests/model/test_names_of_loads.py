@@ -154,7 +154,10 @@ def test_the_shadow_on_a_point_jumps() -> None:
     ("given", "message"),
     [
         (loads(EARTH, torque("ux_sun", "0", "0")), "ux_NAME, uy_NAME, uz_NAME, r_NAME with a load"),
-        (loads(EARTH, torque("1e-9*bx", "0", "0")), "bx, by, bz with the field of a magnetic_dipole"),
+        (
+            loads(EARTH, torque("1e-9*bx", "0", "0")),
+            "bx, by, bz and dbx, dby, dbz with the field of a magnetic_dipole",
+        ),
         (loads(EARTH, torque("1e-9*shadow_earth", "0", "0")), "another one whose source has a radius"),
         (loads(EARTH, EARTH), 'two loads are named "earth"'),
     ],

@@ -304,7 +304,7 @@ def test_independent_equations_come_back_and_grow_alike() -> None:
         (SATELLITE, {"body": "principal_moments = [1, 1, 1]"}, "equilibrium", "rests in any attitude"),
         (SATELLITE, {"body": 'principal_moments = ["1 + t", 2, 2.5]'}, "equilibrium", "moments vary"),
         (SATELLITE, {"more": '\n[[states]]\nname = "sum"\nderivative = "wy"\n[[loads]]\nkind = "torque"\n'
-         'components = ["1e-9*sum", "0", "0"]'}, "equilibrium", "the state sum changes in it"),
+         'components = ["1e-9*sum", "0", "0"]'}, "equilibrium", "the state sum changes in this equilibrium"),
         (SATELLITE, {"name": "cassini_1"}, "equilibrium", "node is at rest"),
         (MOON, {"name": "cassini_1"}, "equilibrium", "there are cassini_2 (6.6"),
         (MOON, {"start": 'spin_period = "-27 day"'}, "spin_period", "given a negative time"),

@@ -115,5 +115,5 @@ def test_pulses_beyond_two_numbers_are_refused_with_the_reason() -> None:
 def test_spikes_that_stop_a_run_are_told_with_what_to_do(torque: str) -> None:
     summary = run_text(LATE.format(torque=torque, precision="double")).summary
     assert summary["status"] == "stopped: non-finite state"
-    for words in ("double precision resolves times", "choose a higher precision"):
+    for words in ("the resolution of time in double precision", "choose a higher precision"):
         assert words in summary["message"]

@@ -25,20 +25,26 @@ RATE = 3 * FLATTENING / SPIN
 RECORD = 'record = ["momentum_axis", "figure_axis", "obliquity", "node_longitude"]'
 
 
-def table() -> str:
+def table(*, anomaly: bool = True) -> str:
     """Rows every half turn or so; the whole turns follow from Kepler's third law."""
-    lines = ["time, eccentricity, inclination, ascending_node, periapsis, mean_anomaly"]
+    lines = [
+        "time, eccentricity, inclination, ascending_node, periapsis" + (", mean_anomaly" if anomaly else "")
+    ]
     for t in np.arange(-12.0, 120.0, 4.0):
-        cells = [t, ECCENTRICITY, 0.2, 1 + NODE * t, 0.5 + PERIAPSIS * t, (0.3 + t) % (2 * math.pi)]
+        cells = [t, ECCENTRICITY, 0.2, 1 + NODE * t, 0.5 + PERIAPSIS * t]
+        cells += [(0.3 + t) % (2 * math.pi)] if anomaly else []
         lines.append(", ".join(repr(float(x)) for x in cells))
     return "\n".join(lines)
 
 
-def text(level: str, *, by_table: bool) -> str:
+def text(level: str, *, by_table: bool, short_period: bool = True, anomaly: bool = True) -> str:
     orbit = '{table = "orbit.csv", semi_major_axis = 1}' if by_table else KEPLER
-    model = f'[model]\nlevel = "{level}"\nshort_period = true\n[frame]\nreference = "orbit"\n'
+    if by_table and not anomaly:
+        orbit = orbit[:-1] + ", mean_anomaly = 0.3}"
+    model = f'[model]\nlevel = "{level}"\nshort_period = {str(short_period).lower()}\n'
+    model += '[frame]\nreference = "orbit"\n'
     if by_table:
-        model += f"[tables.\"orbit.csv\"]\ntext = '''\n{table()}\n'''"
+        model += f"[tables.\"orbit.csv\"]\ntext = '''\n{table(anomaly=anomaly)}\n'''"
     return config(BODY, START, LOAD.format(orbit=orbit), "end = 100\nsamples = 101", "", RECORD, model)
 
 
