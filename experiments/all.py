@@ -31,7 +31,6 @@ STUDIES = (
     "cassini_states",
     "tumbling_averages",
     "damped_averages",
-    "earth_obliquity",
     "rigid_earth",
     "real_moon",
     "mars_rotation",

@@ -1,6 +1,5 @@
-"""Writes earth_secular.csv, the orbit of the Earth with its Moon over a million years, for
-experiments/earth_obliquity.py; and the orbit of Mars over the next 10 million years. The mars_secular.csv of
-mars_obliquity.toml is older: it lacks the quadrupole below.
+"""Writes the orbit of Mars over the next 10 million years, or of the Earth with its Moon over a million. The
+mars_secular.csv of mars_obliquity.toml is older: it lacks the quadrupole below.
 
     python configs/tables/mars_secular.py                       # some fifteen minutes; takes numba
     python configs/tables/mars_secular.py earth                 # some four
