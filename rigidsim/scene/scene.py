@@ -507,6 +507,15 @@ def carried_states(
 _ROUNDING_OF_INPUT = 1e-14  # relative, of moments that a double-precision program printed
 
 
+def without_apart(scene: Scene, loads: Sequence[SceneLoad]) -> Scene:
+    """The scene with loads given from Python, whose tensors ``apart`` don't turn with the body either."""
+    apart = [load.apart for load in (*scene.loads, *loads) if load.apart is not None]
+    if all(load.apart is None for load in loads):
+        return scene
+    turning, inverse = turning_inertia(scene.context, scene.body, apart)
+    return replace(scene, turning_inertia=turning, inverse_inertia=inverse)
+
+
 def turning_inertia(context: Any, body: RigidBody, apart: Sequence[Matrix]) -> tuple[Matrix, Matrix]:
     """Tensor of what turns with the body, its own less the tensors of what turns ``apart``, and its inverse:
     by elements, so that numbers of a sweep stay in it.

@@ -23,7 +23,7 @@ from rigidsim.scene.choices import AUTO, FORMULATIONS
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.expressions.tree import ExpressionError, evaluate, names_used
 from rigidsim.scene.paths import numbers
-from rigidsim.scene.scene import Scene, build_scene, check_start, start_values
+from rigidsim.scene.scene import Scene, build_scene, check_start, start_values, without_apart
 from rigidsim.scene.surfaces import root_parts
 from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.precision import Precision, Scalar, precision_of
@@ -157,6 +157,7 @@ def prepare_scene(
         if given is not None:
             _check_tolerance(given, precision)
         check_start(scene)
+        scene = without_apart(scene, loads)
         if loads and scene.found_start is not None:
             what = "given with loads from Python, which have no part in finding it; give attitude and rates"
             raise ConfigError(Problem("[initial] equilibrium", what))

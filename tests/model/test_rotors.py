@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from support import config, loaded, matrices, run_text, same_bits, seeds
 
 import rigidsim
+from rigidsim.model.loads import Load
 from rigidsim.solve.problem import prepare
 
 MOMENTS, RATES = [1, 2, 2.5], [0.3, 1.0, 0.5]
@@ -294,3 +295,32 @@ def test_a_gimbal_that_is_none_is_refused() -> None:
     ):
         with pytest.raises(rigidsim.ConfigError, match=said):
             run_text(config(more=wheel + more + "\n"))
+
+
+def test_a_carrier_from_python_with_a_tensor_apart_is_a_free_rotor() -> None:
+    class Own(Load):
+        title, conservative, apart = "wheel", True, [[0, 0, 0], [0, 0, 0], [0, 0, 0.2]]
+
+        def carried_momentum(self, m: Any) -> Any:
+            return [([0, 0, 0.2 * (3 + RATES[2])], 1.0)]
+
+        def exerted_torque(self, m: Any) -> Any:
+            return []
+
+        def carried_energy(self, m: Any) -> Any:
+            return None
+
+        def supplied_power(self, m: Any) -> Any:
+            return None
+
+        def carried_at_start(self, scene: Any) -> Any:
+            zero = scene.context.zero
+            return [zero, zero, scene.context.mpf(0.2 * (3 + RATES[2]))], zero
+
+        def amplitude(self, scene: Any) -> Any:
+            return scene.context.zero
+
+    free = run_text(scene(Wheel([0, 0, 1], 0.2, 3), end=9))
+    given = rigidsim.parse(scene(end=9))
+    found = rigidsim.run(given, out=None, loads=[Own()]).dataset.angular_velocity
+    np.testing.assert_allclose(found, loaded(free).angular_velocity, rtol=0, atol=1e-13)
