@@ -131,7 +131,9 @@ def own_units(scene: Scene, scaling: Scaling, like: Mapping[str, int] | None = N
     for state in scene.states:
         start = abs(state.initial)
         unit = exponent(context, context.maximum([start, sizes[state.name]]))
-        found[state.name] = unit if start == 0 else min(unit, exponent(context, start) + _MOST_GROWTH)
+        # a start that follows from others may be their rounding, whose digits mean nothing
+        given = start != 0 and state.begins is None
+        found[state.name] = min(unit, exponent(context, start) + _MOST_GROWTH) if given else unit
     return found
 
 

@@ -97,7 +97,9 @@ def test_libration_in_time_and_in_planes() -> None:
         inside.get_ydata(), np.rad2deg(dataset["roll_pitch_yaw"].values[:, 1]), atol=1e-9
     )
     assert page.axes[2].get_xlabel() == "towards −x [deg]"
-    assert titles(page)[2:] == ["The source seen from the body (+: −z axis)", "Phase planes"]
+    assert [x.replace("\n", " ") for x in titles(page)[2:]] == [
+        "The source seen from the body (+: −z axis)", "Phase planes",
+    ]  # fmt: skip
     assert titles(figures.figure(dataset))[0].startswith("Libration")
     # pitched by a right angle roll and yaw are undefined, and the source still where it is
     steep = dataset[["nadir", "roll_pitch_yaw"]].assign_attrs(dataset.attrs)
