@@ -289,7 +289,7 @@ def coverage_scene(number: int, seed: int = 1, name: str = "") -> CoverageScene:
         integrator.append(f"tolerance = {draw.decades(-13, -7):.3g}")
     elif kind < 0.43:
         integrator.append("hold_invariants = true")
-    if name == DEEP_TIME:  # which has states of its own, and holds none
+    if name == DEEP_TIME:  # which brings its states, and holds none
         integrator = [x for x in integrator[1:] if "hold" not in x] or ['precision = "double"']
     if family.averaged:
         integrator = []

@@ -39,7 +39,7 @@ class Known:
     ``frames`` are rates (rad/s) of other frames in which its line may be seen, at its value plus such a rate.
 
     ``kind`` of a secular frequency: g of a perihelion, s of a node, k of the equinox. Their combinations are
-    so many that only those of ``SECULAR`` are labels; of several that fit, the first ones known.
+    so many that only combinations in ``SECULAR`` are labels; of several that fit, the first ones known.
     """
 
     name: str

@@ -2,7 +2,7 @@
 axes (AEM and APM of 504.0-B-1 and 504.0-B-2), the path in SI (OEM of 502.0-B). Covariances are passed over.
 
 An APM is read as an AEM of one row: of its blocks the first that has an attitude counts, quaternion, Euler
-angles or spin, with its own rates or those of another block.
+angles or spin, with rates in the same or another block.
 
 Conventions of annex F of 504.0-B-2. The quaternion from frame A to frame B turns the axes of A into B's, so
 that it turns a vector's coordinates in B into coordinates in A; Euler angles from A to B are intrinsic turns;

@@ -102,7 +102,7 @@ class Motion(ConfigTable):
     )
     """angular velocity relative to space or to relative_to, in body axes; this or angular_momentum"""
     quaternion: Annotated[Four[Dimensionless], NotZero] | None = Field(None, examples=[[1, 0, 0, 0]])
-    """attitude w, x, y, z: takes body axes to space axes (or those of relative_to); any norm but zero; by
+    """attitude w, x, y, z: takes body axes to space axes (or the axes of relative_to); any norm but zero; by
     default the body axes start along these
     """
     euler_angles: Triple[Angle] | None = Field(None, examples=[["10 deg", "23.44 deg", "0 deg"]])

@@ -38,7 +38,7 @@ def export(
 
     Args:
         saved: a run or a sweep, or the path of one.
-        file_format: one of ``rigidsim.formats.FORMATS``, by default that of the suffix of ``out``; csv,
+        file_format: one of ``rigidsim.formats.FORMATS``, by default from the suffix of ``out``; csv,
             parquet or zarr of a sweep.
         out: the file (for zarr the folder); ``NAME.FORMAT`` in the working folder by default (``NAME.bc`` and
             its clock ``NAME.tsc`` for ck, ``NAME.bpc`` and its frame ``NAME.tf`` for pck). In csv and

@@ -286,6 +286,14 @@ def test_a_control_moment_gyro_exchanges_momentum_with_the_body(seed: int) -> No
     np.testing.assert_allclose(data.gimbal_g.values, known[3], rtol=0, atol=1e-10)
 
 
+def test_a_start_by_angular_momentum_counts_a_turned_gimbal() -> None:
+    wheel = '[[rotors]]\nname = "g"\naxis = [0, 0, 1]\nmoment = 0.1\nrate = 9\nfixed = true\n'
+    wheel += 'gimbal = [1, 0, 0]\ngimbal_angle = 1.2\ngimbal_rate = "0.1"\n'
+    output = 'record = ["angular_momentum"]'
+    run = run_text(config(initial="angular_momentum = [1, 2, 3]", output=output, more=wheel))
+    np.testing.assert_allclose(loaded(run).angular_momentum[0], [1, 2, 3], rtol=1e-15)
+
+
 def test_a_gimbal_that_is_none_is_refused() -> None:
     wheel = '[[rotors]]\nname = "g"\naxis = [0, 0, 1]\nmoment = 0.1\nrate = 9\ngimbal_rate = "1"\n'
     for more, said in (

@@ -273,13 +273,14 @@ class GimballedRotor(Rotor):
 
     Attributes:
         gimbal: unit axis of the gimbal, body axes, at right angles to the rotor's axis (mpf).
-        gimbal_rate: of its angle, rad/s.
-        start: the angle at the start (mpf).
+        angle, gimbal_rate: the gimbal's angle, a state, rad; its rate, rad/s.
+        begins: unit axis of the rotor at the start, body axes (mpf).
     """
 
     gimbal: Vector
+    angle: Expression
     gimbal_rate: Expression
-    start: Any
+    begins: Vector
 
     @classmethod
     def on(cls, rotor: Rotor, fields: RotorTable, around: Setting) -> GimballedRotor:
@@ -292,13 +293,20 @@ class GimballedRotor(Rotor):
         what = "missing; a rotor on a gimbal needs fixed = true, by which its motor keeps its rate"
         ensure(fields.fixed, around.fault("fixed", what))
         rate = around.expression("gimbal_rate", required(fields.gimbal_rate), "rad/s")
-        start = fields.gimbal_angle.at(around.context)
+        context, angle = around.context, fields.gimbal_angle.at(around.context)
         unit = [x / size for x in gimbal]
-        return cls(**vars(rotor), gimbal=unit, gimbal_rate=rate, start=start)
+        ways, parts = (rotor.axis, cross(unit, rotor.axis)), (context.cos(angle), context.sin(angle))
+        begins = [sum(part * way[i] for part, way in zip(parts, ways, strict=True)) for i in range(3)]
+        turned = around.expression("gimbal", f"gimbal_{rotor.name}", "rad")
+        return cls(**vars(rotor), gimbal=unit, angle=turned, gimbal_rate=rate, begins=begins)
+
+    @property
+    def inner_momentum(self) -> Vector:  # type: ignore[override]
+        return [self.moment * self.rate * x for x in self.begins]
 
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
-        return states_read(self.gimbal_rate) | {f"gimbal_{self.name}"}
+        return states_read(self.gimbal_rate, self.angle)
 
     def _turned(self, ahead: bool) -> list[tuple[Vector, int]]:
         """Axes of the angle's cosine and sine in the momentum, or in its derivative by the angle."""
@@ -306,8 +314,7 @@ class GimballedRotor(Rotor):
         return [(side, 0), ([-x for x in self.axis], 1)] if ahead else [(self.axis, 0), (side, 1)]
 
     def _terms(self, m: Kinematics, exponent: int, *, ahead: bool = False) -> list[Term]:
-        state = f"gimbal_{self.name}"
-        angle = in_si(m, hy.make_vars(state), m.scaling.own.get(state, 0))
+        (angle,) = written(m, [self.angle])
         size = m.scene.context.ldexp(self.moment * self.rate, exponent)
         parts = hy.cos(angle), hy.sin(angle)
         return [([size * x for x in axis], parts[which]) for axis, which in self._turned(ahead)]
@@ -337,10 +344,7 @@ class GimballedRotor(Rotor):
         return hy.sum(parts)
 
     def carried_at_start(self, scene: Scene) -> tuple[Vector, Any]:
-        context = scene.context
-        parts, size = (context.cos(self.start), context.sin(self.start)), self.moment * self.rate
-        found = [[size * parts[which] * x for x in axis] for axis, which in self._turned(False)]
-        return [x + y for x, y in zip(*found, strict=True)], context.zero
+        return self.inner_momentum, scene.context.zero
 
     def amplitude(self, scene: Scene) -> Any | None:
         """None: its effect is estimated."""

@@ -329,7 +329,7 @@ class Family:
         return [k for k, v in enumerate(self.variables) if str(v) in read]
 
     def as_parameters(self, expressions: Sequence[Any]) -> list[Any]:
-        """Expressions with the parameters as ``hy.par``: first those of pieces, then ``in_equations``."""
+        """Expressions with the parameters as ``hy.par``: first of pieces, then ``in_equations``."""
         variables, first = self.variables, 0 if self.knots is None else self.knots.parameters
         table = {variables[k]: hy.par[first + n] for n, k in enumerate(self.in_equations)}
         found = [hy.expression(x) for x in expressions]

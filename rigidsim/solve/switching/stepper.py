@@ -431,7 +431,7 @@ class SwitchingStepper(TaylorStepper):
             series, size = np.array(engine.tc) if self._fresh else None, abs(float(engine.last_h))
             now, switches = self._now, (self._count, self._since)
             held = time, state.copy(), len(found), now, crossed, switches, taken, size, series
-            passed.append(tuple.__new__(_Passed, held))  # in a third of its own constructor's time
+            passed.append(tuple.__new__(_Passed, held))  # a third of the time of _Passed(...)
             if cut is None and self.has_events:
                 self._quieten(None)
             self._cut, self._fresh = None, cut is not None
