@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rigidsim.workflows.tradeoff import tradeoff
     from rigidsim.workflows.verify import verify
 
-__version__ = "1.0.0"
+__version__ = "2.0.0.dev0"
 
 __all__ = [
     "ConfigError", "Experiment", "MemoryRun", "RigidsimError", "Run", "RunFolderError", "SavedRun",

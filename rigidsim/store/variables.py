@@ -30,7 +30,7 @@ OF_THE_RUN = ("point_mass", "rotor", "rigid_body", "source", "parameter")
 """
 
 SCHEMA_VERSION = 4
-"""Of all versions 1.x. Earlier versions were never released; files of any other version are refused."""
+"""Of versions 1.x and 2.x. Earlier versions were never released; files of any other version are refused."""
 
 
 @dataclass(frozen=True)

@@ -451,7 +451,9 @@ def print_verdict(verdict: dict[str, Any], what: str = "sample") -> None:
     if names:
         on.say(f"  variables that differ: {', '.join(names)}")
     if verdict["environment"]:
-        on.say("  changed since, which can explain other bits:")
+        on.say(
+            "  changed since:" if verdict["identical"] else "  changed since, which can explain other bits:"
+        )
         for line in verdict["environment"]:
             on.say(f"    {line}")
     elif names:
