@@ -87,7 +87,10 @@ def test_the_numbers_are_those_of_every_machine(path: Path) -> None:
     for name, texts in saved.items():
         expected = np.array([float(t) for t in texts])
         got = np.array([float(t) for t in found[name]])
-        error = np.linalg.norm(got - expected)
+        apart = got - expected
+        if name == "roll_pitch_yaw":  # at a start with a pitch of 90 deg the last bit decides the whole turn
+            apart -= 2 * np.pi * np.round(apart / (2 * np.pi))
+        error = np.linalg.norm(apart)
         assert error <= ALLOWED * np.linalg.norm(expected), f"{name}: {got} instead of {expected}"
 
 
