@@ -5,7 +5,7 @@
 | ``version`` | 1 |
 | ``moments``, ``axes``, ``inertia`` | principal moments and axes (rows, body axes), tensor, kg m^2 |
 | ``center_of_mass``, ``mass`` | from the reference point, body axes, m; kg |
-| ``drawing`` | solids, see ``solids.body_meshes`` |
+| ``drawing`` | solids, see ``solids.body_meshes``; from 2.0.0 also meshes of files |
 | ``host`` | name of the body of the kernel that it is, or null |
 | ``figure_axis``, ``reference`` | unit vectors, body and space axes; null for what the body or nobody says, and ``"moving"`` for the normal of a plane that moves |
 | ``space_axes`` | name of the space axes |

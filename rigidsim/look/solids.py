@@ -8,6 +8,7 @@ whose equatorial moments are equal, leaves open. ``data/earth.png`` has the coas
 and diameters in the IAU's Gazetteer.
 """
 
+from base64 import b64decode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import files
@@ -27,6 +28,7 @@ Color = tuple[int, int, int]
 
 SEGMENTS = 64  # around the axis; a multiple of 8, so that colour sectors end on an edge
 MINOR_SEGMENTS = 32  # along an arc: around a tube or from pole to pole
+MESH = "mesh"  # of a file, by its triangles
 POINT = "point"  # a point mass, which has no shape and is drawn as a ball
 
 # Faces of a cuboid carry the colour of the body axis that they face; the negative side is darker.
@@ -98,8 +100,8 @@ def body_meshes(drawing: Sequence[Mapping[str, Any]]) -> list[Mesh]:
 
     Each is {"solid", "dimensions", "position", "quaternion"}: position of the solid's centre of mass in body
     axes from the reference point, metres; quaternion [w, x, y, z] turns the solid's axes to body axes. Of an
-    empty list a unit cube. The volume of a `point` goes with its `mass_fraction`; the largest radius is a
-    sixth of the reach.
+    empty list a unit cube. A `mesh` has step, vertices and triangles. The volume of a `point` goes with its
+    `mass_fraction`; the largest radius is a sixth of the reach.
     """
     solids = [(entry, *_placement(entry)) for entry in drawing or [_CUBE]]
     meshes = [None if one["solid"] == POINT else _solid(one).moved(*place) for one, *place in solids]
@@ -118,8 +120,28 @@ def body_meshes(drawing: Sequence[Mapping[str, Any]]) -> list[Mesh]:
 
 
 def _solid(entry: Mapping[str, Any]) -> Mesh:
+    if entry["solid"] == MESH:
+        return _of_triangles(**entry["dimensions"])
     mesh = solid_mesh(entry["solid"], entry.get("dimensions", {}))
     return _two_sided(mesh, _BARE) if entry.get("one_sided") else mesh
+
+
+def _of_triangles(step: float, vertices: str, triangles: str) -> Mesh:
+    """A mesh as ``scene.bodies.files`` keeps it, in the colours of the axes that it faces; smooth where its
+    triangles meet nearly flat.
+    """
+    places = np.frombuffer(b64decode(vertices), "<i2").reshape(-1, 3) * step
+    faces = np.frombuffer(b64decode(triangles), "<u2").reshape(-1, 3)
+    corners = places[faces]
+    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sizes = np.linalg.norm(areas, axis=1)
+    corners, faces, areas = (x[sizes > 0] for x in (corners, faces, areas))
+    flat = areas / sizes[sizes > 0, None]
+    around = np.stack([np.bincount(faces.ravel(), np.repeat(x, 3), len(places)) for x in areas.T], axis=1)
+    smooth = around[faces] / np.maximum(np.linalg.norm(around[faces], axis=2, keepdims=True), 1e-300)
+    normals = np.where(np.einsum("tij,tj->ti", smooth, flat)[..., None] > _SHARP, smooth, flat[:, None, :])
+    shade = flat**2 * np.where(flat > 0, 1.0, _DARKER)
+    return Mesh(corners, normals, _painted(shade @ np.array(_AXIS_COLORS)), np.zeros((len(faces), 3, 2)))
 
 
 def _two_sided(plate: Mesh, back: Color) -> Mesh:

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from support import seeds
 
 import rigidsim
+from rigidsim.look.solids import body_meshes
 from rigidsim.scene.scene import build_scene
 
 pytest.importorskip("trimesh")
@@ -79,6 +80,27 @@ def test_a_mesh_has_the_moments_and_the_field_of_its_volume(tmp_path: Path, seed
         value, pair = mass @ values / mass.sum(), [(n, m, False), (n, m, True)]
         c, s = (float(found.gravity.coefficients.get(key, 0)) for key in pair)
         assert c + 1j * s == pytest.approx(value, abs=1e-13)
+    [drawn] = body_meshes(found.drawing)  # from the centre of mass, with its outside outside
+    apart = np.linalg.norm(drawn.vertices[:, None] - (corners / 100 - center), axis=2)
+    assert drawn.corners.shape == (4, 3, 3)
+    assert (apart.min(axis=1) < 2**-14 * radius).all()
+    assert (np.einsum("tij,tj->ti", drawn.normals, drawn.corners.mean(axis=1)) > 0).all()
+
+
+def test_a_large_mesh_is_drawn_with_fewer_triangles_and_once_placed(tmp_path: Path) -> None:
+    """A ball of 10 mm at (30, 0, 0) mm, turned by a right angle about z and moved by 1 m along z."""
+    trimesh = pytest.importorskip("trimesh")
+    ball = trimesh.creation.icosphere(subdivisions=5, radius=10.0)
+    ball.apply_translation([30, 0, 0])
+    ball.export(tmp_path / "ball.stl")
+    part = '[[body.parts]]\nfile = "ball.stl"\nunit = "mm"\nmass = 1\nposition = [0, 0, 1]\n'
+    part += 'euler_angles = ["90 deg", 0, 0]\neuler_sequence = "zyx"\n'
+    other = '[[body.parts]]\nshape = "sphere"\nradius = 0.1\nmass = 1\n'
+    found = built(tmp_path, part + other + "[body]\nreference = [0, 0, 0]")
+    drawn, _ = body_meshes(found.drawing)
+    assert 1000 < len(drawn.corners) <= 5000 < len(ball.faces)
+    sizes = np.linalg.norm(drawn.vertices - [0, 0.03, 1], axis=1)
+    assert 0.0096 < sizes.min() <= sizes.max() < 0.01001
 
 
 @pytest.mark.parametrize("seed", seeds(6, 30))

@@ -605,7 +605,11 @@ class _Pieces:
         )
         inertia = [[density * context.mpf(x) * unit**5 for x in row] for row in read["tensor"]]
         center = [context.mpf(x) * unit for x in read["center"]]
-        return self._alike(density * volume, center, inertia, f"{place}file")
+        piece = self._alike(density * volume, center, inertia, f"{place}file")
+        if drawn := read.get("drawing"):  # which texts of before have not
+            drawn["step"] = float(plain(context.mpf(drawn["step"]) * unit))
+            piece.drawing = _drawn("mesh", drawn, center)
+        return piece
 
     def _unit(self, table: Body | Part, place: str) -> Any:
         """Metres of the unit of a mesh."""

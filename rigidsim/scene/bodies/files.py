@@ -4,7 +4,8 @@ Of a mesh the config keeps moments (``moments_of``) instead of triangles. The vo
 into tetrahedra over its triangles; Grundmann & Moeller's rule of 15 points (1978, SIAM J. Numer. Anal. 15,
 282) integrates polynomials of degree 5 over each exactly: volume, centre, inertia tensor, and the gravity
 field to degree 4 (unnormalized coefficients; recursions of Cunningham 1970, Celest. Mech. 2, 207).
-Coordinates and sums are doubles.
+Coordinates and sums are doubles. For pictures it keeps triangles, too, on a grid of 2^-15 of the largest
+distance; of more than ``_DRAWN`` triangles those that are left when vertices in a cell become one.
 
 A link's inertia is about its centre of mass, in axes of the link: URDF's roll, pitch and yaw turn about fixed
 axes, MJCF's ``fullinertia`` is xx yy zz xy xz yz. Numbers keep the digits of the file.
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from base64 import b64encode
 from collections.abc import Callable, Mapping
 from itertools import product
 from pathlib import Path
@@ -33,6 +35,8 @@ _XML = (".urdf", ".xml", ".mjcf")
 _DEGREES = (3, 4)
 _ROUNDING = 1e-14
 """Of sums over triangles: elements of a tensor and coefficients below it are zero by symmetry."""
+_DRAWN = 5000
+_GRID = 2**15 - 1
 _VOLUME = 1e-9
 """Volume over the volume of the bounding box below which nothing is enclosed."""
 
@@ -60,6 +64,7 @@ def moments_of(path: Path) -> str:
     try:
         mesh = trimesh.load_mesh(path, process=True)
         triangles, closed = np.asarray(mesh.triangles, dtype=float), bool(mesh.is_watertight)
+        vertices, faces = np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces)
     except Exception as error:  # trimesh raises whatever its parsers do
         raise ValueError(f"trimesh can't read it ({type(error).__name__}: {error})") from None
     if not (len(triangles) and closed and mesh.is_winding_consistent):
@@ -87,7 +92,8 @@ def moments_of(path: Path) -> str:
             field[key] += weight * complex((volumes * values).sum()) / volume
     tensor = (np.trace(second) * np.eye(3) - (second + second.T) / 2) * math.copysign(1, volume)
     tensor[np.abs(tensor) < _ROUNDING * tensor.max()] = 0
-    lines = [f"# moments of {path.name}, {len(triangles)} triangles, for unit density"]
+    drawn, among = _drawn(vertices - center - off, faces[:, :: 1 if volume > 0 else -1], radius)
+    lines = [f"# moments of {path.name}, {len(triangles)} triangles, for unit density; {among} are drawn"]
     lines += [f"volume = {abs(volume)!r}", f"center = {(center + off).tolist()}"]
     lines += [f"tensor = {tensor.tolist()}", "[gravity_field]", f"radius = {radius!r}"]
     for name, part in (("C", "real"), ("S", "imag")):
@@ -95,7 +101,25 @@ def moments_of(path: Path) -> str:
         lines.append(
             f"{name} = {{{', '.join(f'{k} = {v!r}' for k, v in sizes.items() if abs(v) > _ROUNDING)}}}"
         )
-    return "\n".join(lines)
+    return "\n".join([*lines, "[drawing]", f"step = {radius / _GRID!r}", *drawn])
+
+
+def _drawn(vertices: np.ndarray, faces: np.ndarray, radius: float) -> tuple[list[str], int]:
+    """Vertices from the centre of mass in steps, and their numbers in triangles, for ``look.solids``; and how
+    many triangles.
+    """
+    for cells in (_GRID, *(2**k for k in range(8, 1, -1)), 3, 2, 1):  # across the radius
+        _, cell, counts = np.unique(
+            np.round(vertices * (cells / radius)), axis=0, return_inverse=True, return_counts=True
+        )
+        named = cell.reshape(-1)[faces]
+        named = named[(named != np.roll(named, 1, axis=1)).all(axis=1)]
+        if len(named) <= _DRAWN:
+            break
+    sums = np.stack([np.bincount(cell.reshape(-1), x) for x in vertices.T], axis=1)
+    places = np.round(sums / counts[:, None] * (_GRID / radius)).astype("<i2")
+    tables = {"vertices": places, "triangles": named.astype("<u2")}
+    return [f'{k} = "{b64encode(x.tobytes()).decode()}"' for k, x in tables.items()], len(named)
 
 
 def _rule() -> list[tuple[float, np.ndarray]]:
