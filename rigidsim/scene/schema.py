@@ -570,7 +570,7 @@ class FitDataTable(ConfigTable):
     scale: Literal["TDB", "TT", "TAI", "GPS", "UTC"] = "UTC"
     """time scale of dates that don't name theirs"""
     offset: Second = Field(ZERO, examples=["37 s"])
-    """added to the times"""
+    """added to the times; estimated if "fit.data[N].offset", N from 0, is among the parameters"""
     outliers: Annotated[Dimensionless, _ONE_OR_MORE] | None = Field(None, examples=[4])
     """leave out and report rows with a residual above so many standard deviations; by default none"""
 

@@ -59,8 +59,13 @@ class VariedKey:
         return abs(fraction_of(found.at(context))) or Fraction(1)
 
 
-def varied_keys(experiment: Experiment, keys: Sequence[str], where: str = _WHERE) -> tuple[VariedKey, ...]:
+def varied_keys(
+    experiment: Experiment, keys: Sequence[str], where: str = _WHERE, also: str = ""
+) -> tuple[VariedKey, ...]:
     """The numbers that keys stand for, vectors and tensors component by component, in the order given.
+
+    Args:
+        also: a further key that is allowed, with N for any index.
 
     Raises:
         ConfigError: a key that there isn't, that has no number, or that is given twice; every problem.
@@ -69,7 +74,7 @@ def varied_keys(experiment: Experiment, keys: Sequence[str], where: str = _WHERE
     found: dict[str, VariedKey] = {}
     for key in keys:
         try:
-            for one in _numbers_of(experiment, key, where):
+            for one in _numbers_of(experiment, key, also):
                 double = next((x for x in found.values() if x.places == one.places and x.places), None)
                 if one.name in found or double is not None:
                     name = one.name if double is None or double.name == one.name else double.name
@@ -117,7 +122,7 @@ def _turned(scene: Scene, vector: Sequence[Any]) -> Scene:
 # --- from texts to numbers ----------------------------------------------------------------------------------
 
 
-def _numbers_of(experiment: Experiment, key: str, where: str) -> list[VariedKey]:
+def _numbers_of(experiment: Experiment, key: str, also: str) -> list[VariedKey]:
     """The numbers of one key; ValueError, to be read after the key, if there are none."""
     try:
         path = Path.of(key)
@@ -125,8 +130,9 @@ def _numbers_of(experiment: Experiment, key: str, where: str) -> list[VariedKey]
         raise ValueError(f"isn't a key: {error}") from None
     if path.steps[:2] == ("initial", "attitude"):
         return _of_attitude(experiment, path)
-    if path.steps[0] not in _TABLES:
-        raise ValueError(f"is no number of the motion; keys of {', '.join(_TABLES)} are allowed")
+    if path.steps[0] not in _TABLES and "".join("N" if x.isdigit() else x for x in str(path)) != also:
+        more = f" and {also}" * bool(also)
+        raise ValueError(f"is no number of the motion; keys of {', '.join(_TABLES)}{more} are allowed")
     unit = path.taken(config_model(), experiment.to_dict()).unit
     value = path.get(experiment.config)
     named = _numbers_in(value, path)

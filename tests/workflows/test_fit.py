@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+from support import seeds, unoptimised_code
 
 import rigidsim
 from rigidsim.errors import ConfigError, RigidsimError, RunFolderError
@@ -366,3 +369,66 @@ def test_what_no_fit_can_be_made_of_is_refused(here: Path) -> None:
     single = LAMINA.replace("[fit]", '[integrator]\nprecision = "single"\n[fit]') + RATES
     with pytest.raises(ConfigError, match=r"\[integrator\] precision: .*\"double\" is allowed"):
         rigidsim.fit(rigidsim.parse(single))
+
+
+@pytest.mark.parametrize("seed", seeds(1, 30))
+def test_the_late_clock_of_one_file_is_estimated_with_the_motion(here: Path, seed: int) -> None:
+    """Rows of a free body with noise, by SciPy: attitudes in time, rates late. The offset is the true one
+    within its sigma, which is that of the joint normal equations.
+    """
+    rng = np.random.default_rng(seed)
+    moments, w = np.array([1.0, 2.0, 2.5]), rng.uniform(0.3, 1, 3)
+
+    def moving(x: np.ndarray) -> tuple[Rotation, np.ndarray]:
+        """Attitudes, and rates by a clock late by x[3]; x[:3] turns the start, x[4:] are its rates."""
+
+        def slopes(_: float, y: np.ndarray) -> np.ndarray:
+            q, w = y[:4], y[4:]
+            turn = np.array([-q[1:] @ w, *(q[0] * w + np.cross(q[1:], w))]) / 2
+            return np.concatenate([turn, -np.cross(w, moments * w) / moments])
+
+        first = np.concatenate([np.roll(Rotation.from_rotvec(x[:3]).as_quat(), 1), x[4:]])
+        known = solve_ivp(slopes, (0, 10), first, "DOP853", dense_output=True, rtol=1e-12, atol=1e-14).sol
+        return Rotation.from_quat(np.roll(known(times)[:4].T, -1, axis=1)), known(times + x[3])[4:].T
+
+    sigma, times = 1e-3, np.linspace(0.5, 9.5, 40)
+    truth = np.array([0, 0, 0, rng.uniform(-0.3, 0.3), *w])
+    attitude, rates = moving(truth)
+    noise = sigma * rng.normal(size=(2, 40, 3))
+    noisy = np.roll((attitude * Rotation.from_rotvec(noise[0])).as_quat(), 1, axis=1)
+    names = [["time", "qw", "qx", "qy", "qz"], ["time", "wx", "wy", "wz"]]
+    for name, columns, values in zip("qw", names, (noisy, rates + noise[1]), strict=True):
+        table(here / f"{name}.csv", columns, [x.tolist() for x in (times, *values.T)])
+    text = FREE.replace("[0.3, 1.0, -0.4]", str((w * 1.001).tolist()))
+    text += '[fit]\nparameters = ["initial.attitude", "fit.data[1].offset", "initial.angular_velocity"]\n'
+    for name, columns, one in zip("qw", names, ("quaternion", "angular_velocity"), strict=True):
+        text += data(f"{name}.csv", one, columns[1:], sigma)
+    with unoptimised_code():
+        found = rigidsim.fit(rigidsim.parse(text))
+    assert found.converged
+
+    def observed(x: np.ndarray) -> np.ndarray:
+        turned, spun = moving(x)
+        return np.concatenate([(turned * attitude.inv()).as_rotvec(), spun])
+
+    ends = [(observed(truth + s) - observed(truth - s)).ravel() / 2e-5 for s in 1e-5 * np.eye(7)]
+    spreads = sigma * np.sqrt(np.diag(np.linalg.inv(np.array(ends) @ np.array(ends).T)))
+    assert [one.sigma for one in found.parameters] == pytest.approx(spreads, rel=0.02)
+    errors = np.array([one.value for one in found.parameters]) - truth
+    assert (np.abs(errors) < 4.5 * spreads).all()
+    late = float(found.dataset["time_2"][0]) - 0.5
+    assert late == pytest.approx(found.value("fit.data[1].offset"))
+
+
+def test_a_clock_and_the_whole_start_are_not_separated(here: Path) -> None:
+    """Of a motion that depends on no date: later rows are an earlier start. Sets of a file share a clock."""
+    turning(here)
+    text = BALL + '[fit]\nparameters = ["initial.attitude[2]", "fit.data[0].offset"]\n' + TURN * 2
+    found = rigidsim.fit(rigidsim.parse(text))
+    [one] = found.undetermined
+    assert one.keys == ["initial.attitude[2]", "fit.data[0].offset"]
+    assert one.amounts[0] / one.amounts[1] == pytest.approx(-0.69, rel=1e-3)
+    alone = rigidsim.fit(rigidsim.parse(text.replace('"initial.attitude[2]", ', "")))
+    assert alone.converged
+    with pytest.raises(ConfigError, match=r"fit\.data\[N\]\.offset are allowed"):
+        rigidsim.fit(rigidsim.parse(text.replace("[0].offset", "[0].outliers")))

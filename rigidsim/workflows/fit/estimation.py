@@ -8,13 +8,15 @@ Tapley, Schutz and Born 2004, Statistical Orbit Determination, section 6.2 (eqs.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from rigidsim.errors import RigidsimError
 from rigidsim.workflows.fit.observations import (
+    CHANGE,
+    ROUNDING,
     FitKeys,
     NotPredicted,
     Prediction,
@@ -206,43 +208,86 @@ class Weighing:
 
     def __init__(self, keys: FitKeys, readings: Sequence[Readings], predictor: Predictor) -> None:
         self.keys, self.readings, self._predictor = keys, list(readings), predictor
-        self.times, places = np.unique(np.concatenate([r.times for r in readings]), return_inverse=True)
-        self._places = np.split(places, np.cumsum([len(r.times) for r in readings])[:-1])
         self.used = [np.ones(len(r.times), dtype=bool) for r in readings]
         self._start = np.array([one.start for one in keys.estimated])
         self._fixed = np.array([one.start for one in keys.considered])
         self._weights = np.array([0.0 if k.sigma is None else 1.0 / k.sigma for k in keys.estimated])
         self.failure = ""
+        self._moving = np.array([one.clock is None for one in keys.all])
+        clocks = {one.clock: n for n, one in enumerate(keys.all) if one.clock is not None}
+        files = {readings[n].source: place for n, place in clocks.items()}
+        # of each set the place of its offset: its own, or that of another set from the same file
+        self._clocks = [clocks.get(n, files.get(r.source)) for n, r in enumerate(readings)]
+        self._begin, (_, end) = float(keys.scene.start), keys.scene.reach
+        rate = np.linalg.norm([float(w) for w in keys.scene.angular_velocity or ()])
+        self._step = CHANGE / max(float(rate), 1 / (end - self._begin))  # s, as for numbers of the motion
+        self._forwards = keys.scene.samples.direction > 0
+
+    def moved(self, values: np.ndarray) -> list[Readings]:
+        """The readings at their times by the clocks of some values."""
+        late = np.array([*values, *self._fixed]) - [one.start for one in self.keys.all]
+        sets = zip(self.readings, self._clocks, strict=True)
+        return [r if clock is None else replace(r, times=r.times + late[clock]) for r, clock in sets]
 
     def linear(self, values: np.ndarray) -> Linear | None:
         """The fit linearised at some values; None where the motion can't be computed."""
+        sets = self.moved(values)
+        each = [
+            [r.times] if clock is None else [r.times, *self._around(r.times)]
+            for r, clock in zip(sets, self._clocks, strict=True)
+        ]
+        times, places = np.unique(np.concatenate([x for one in each for x in one]), return_inverse=True)
+        at = iter(np.split(places, np.cumsum([len(x) for one in each for x in one])[:-1]))
         try:
-            found = self._predictor.at([*values, *self._fixed], self.times)
+            found = self._predictor.at(np.array([*values, *self._fixed])[self._moving], times)
         except NotPredicted as error:
             self.failure = str(error)
             return None
         every, residuals, slopes, noise = [], [], [], np.zeros(len(self.keys.all))
-        for readings, places, used in zip(self.readings, self._places, self.used, strict=True):
-            name, sigmas = readings.quantity.variable, readings.sigmas[used]
-            every.append(difference(readings.quantity, found.values[name][places], readings.values))
-            slope = found.slopes[name][places][used]
-            if readings.quantity.rotation:
+        for readings, used, clock, at_times in zip(sets, self.used, self._clocks, each, strict=True):
+            one, sigmas = readings.quantity, readings.sigmas[used]
+            name, rows = one.variable, [next(at) for _ in at_times]
+            ends = [found.values[name][place] for place in rows]
+            every.append(difference(one, ends[0], readings.values))
+            slope = self._widened(found.slopes[name][rows[0]])
+            weight = np.sum(sigmas**-2.0)
+            noise[self._moving] += found.noise[name] ** 2 * weight
+            if clock is not None:
+                widths = at_times[2] - at_times[1]
+                slope[:, :, clock] = difference(one, ends[1], ends[2]) / widths[:, None]
+                size = 1.0 if one.rotation or one.form == "angle" else float(np.abs(ends[0]).max())
+                noise[clock] += (ROUNDING * size / self._step) ** 2 * weight
+            slope = slope[used]
+            if one.rotation:
                 slope = np.einsum("nij,njk->nik", inverse_right_jacobian(every[-1][used]), slope)
             residuals.append((every[-1][used] / sigmas).ravel())
             slopes.append((slope / sigmas[:, :, None]).reshape(-1, slope.shape[2]))
-            noise += found.noise[name] ** 2 * np.sum(sigmas**-2.0)
         table, k = np.concatenate(slopes), len(self.keys.estimated)
         return Linear(
             np.concatenate(residuals), table[:, :k], table[:, k:], np.sqrt(noise)[:k],
             self._start - values, self._weights, every,
         )  # fmt: skip
 
+    def _around(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Times just before and after others, on the same side of the run's start."""
+        before, after, begin = times - self._step, times + self._step, self._begin
+        later = (times > begin) | ((times == begin) & self._forwards)
+        before = np.where(later, np.maximum(before, begin), before)
+        return before, np.where(later, after, np.minimum(after, begin))
+
+    def _widened(self, slopes: np.ndarray) -> np.ndarray:
+        """Derivatives (rows, components, numbers) by all numbers from those by numbers of the motion."""
+        wide = np.zeros((*slopes.shape[:2], len(self._moving)))
+        wide[:, :, self._moving] = slopes
+        return wide
+
     def along(self, values: np.ndarray, times: np.ndarray) -> Prediction:
         """Predictions with derivatives along the run, as far as the scene has them."""
         try:
-            return self._predictor.along([*values, *self._fixed], times)
+            found = self._predictor.along(np.array([*values, *self._fixed])[self._moving], times)
         except NotPredicted:
             return Prediction({})
+        return replace(found, slopes={name: self._widened(x) for name, x in found.slopes.items()})
 
     def sizes(self, residuals: list[np.ndarray]) -> list[np.ndarray]:
         """Of each row the largest residual of its components, in sigmas, (rows,) for each set."""

@@ -261,7 +261,7 @@ def result_of(
     null = solution.null / solution.scales  # rows in the numbers' own units
     directions, parts = _directions(null, solution.scales, np.array([one.size for one in keys.estimated]))
     determined = ~parts.any(axis=0)
-    sets = list(zip(weighing.readings, weighing.used, linear.sets, strict=True))
+    sets = list(zip(weighing.moved(values), weighing.used, linear.sets, strict=True))
     used = sum(int(u.sum()) * r.sigmas.shape[1] for r, u, _ in sets)
     freedom = used + int((linear.weights > 0).sum()) - count + len(null)
     scale = float(np.sqrt(linear.cost / freedom)) if freedom > 0 else None

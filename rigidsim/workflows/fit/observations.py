@@ -468,6 +468,7 @@ def _usable(sigma: Any) -> Any:
 
 # --- parameters ---------------------------------------------------------------------------------------------
 
+_CLOCK = "fit.data[N].offset"
 _ATTITUDES = ("euler_angles", "pole", "prime_meridian", "obliquity", "node_longitude", "apm")
 
 
@@ -481,6 +482,7 @@ class FitKey:
         start: the config's value, SI. sigma: known beforehand, SI; None for nothing.
         suffix: unit with which values are written into the config, where they have one there.
         places: keys of the config where it stands. size: against which changes of it are small or not.
+        clock: of an offset, the index of its ``[[fit.data]]``; None for numbers of the motion.
     """
 
     key: str
@@ -490,6 +492,7 @@ class FitKey:
     suffix: str = ""
     places: tuple[str, ...] = ()
     size: float = 1.0
+    clock: int | None = None
 
 
 class FitKeys:
@@ -514,12 +517,17 @@ class FitKeys:
         """Estimated ones, then considered ones."""
         return (*self.estimated, *self.considered)
 
+    @property
+    def motion(self) -> tuple[FitKey, ...]:
+        """All but offsets of times, which no motion depends on."""
+        return tuple(one for one in self.all if one.clock is None)
+
     # --- reading --------------------------------------------------------------------------------------------
 
     def _all(
         self, where: str, keys: Sequence[str], known: str, sigmas: Mapping[str, KnownWithin]
     ) -> tuple[FitKey, ...]:
-        every = varied_keys(self._experiment, keys, f"[fit] {where}")
+        every = varied_keys(self._experiment, keys, f"[fit] {where}", _CLOCK)
         found, problems = {one.name: self._one(one) for one in every}, []
         for key, table in sorted(sigmas.items(), key=lambda item: len(item[0])):  # components override
             plain = key.replace(" ", "")
@@ -550,15 +558,17 @@ class FitKeys:
             suffix = unit = f"rad{found[1:]}" if found.startswith("1/") else found
         places = tuple(str(place) for place in varied.places)
         size = abs(float(varied.number)) or abs(float(varied.size)) or 1.0
-        return FitKey(varied.name, unit, float(varied.number), None, suffix, places, size)
+        steps = varied.places[0].steps if varied.places else ()
+        clock = int(steps[2]) if steps[:1] == ("fit",) else None
+        return FitKey(varied.name, unit, float(varied.number), None, suffix, places, size, clock)
 
     # --- other values ---------------------------------------------------------------------------------------
 
     def overrides(self, values: Sequence[float] | np.ndarray) -> list[str]:
-        """``KEY=VALUE`` texts of values in the order of ``all``, every digit of the doubles written."""
+        """``KEY=VALUE`` texts of values in the order of ``motion``, every digit of the doubles written."""
         found = []
         turn = np.zeros(3)
-        for one, value in zip(self.all, values, strict=True):
+        for one, value in zip(self.motion, values, strict=True):
             if one.key.startswith(ATTITUDE):
                 turn[int(one.key[-2])] = value
             else:
@@ -595,8 +605,9 @@ class FitKeys:
 
     def fitted(self, values: Sequence[float] | np.ndarray) -> Experiment:
         """The config with estimated values written in, and without ``[fit]``."""
-        everything = [*values, *(one.start for one in self.considered)]
-        return self._experiment.having(["fit=", *self.overrides(everything)])
+        everything = zip(self.all, [*values, *(one.start for one in self.considered)], strict=True)
+        moving = [value for one, value in everything if one.clock is None]
+        return self._experiment.having(["fit=", *self.overrides(moving)])
 
 
 def _sigma(given: Any, varied: VariedKey, parameter: Any) -> float:
@@ -619,7 +630,7 @@ central differences make: what is cut off and the rounding of double runs are a 
 """
 ALONG = ("quaternion", "angular_velocity", "position")
 """What is predicted along the whole run."""
-_ROUNDING = 1e-12  # of runs in double precision, relative to the size of what is observed
+ROUNDING = 1e-12  # of runs in double precision, relative to the size of what is observed
 _FIRST = 1e-4  # first steps, relative to the size of each number
 
 
@@ -651,7 +662,7 @@ class ByDifferences:
     def __init__(self, keys: FitKeys, quiet: Experiment, quantities: Sequence[Observed]) -> None:
         self._keys, self._quiet = keys, quiet
         self._variables = {one.variable: one for one in quantities}
-        self._steps = _FIRST * np.array([one.size for one in keys.all])
+        self._steps = _FIRST * np.array([one.size for one in keys.motion])
         self._adapted = False
 
     def at(self, values: Sequence[float], times: np.ndarray) -> Prediction:
@@ -714,9 +725,11 @@ class ByDifferences:
                 before, after = ends[0][1][name], ends[1][1][name]
                 slopes[name].append(difference(one, before, after) / width)
         for name, parts in slopes.items():
-            found.slopes[name] = np.stack(parts, axis=2)
+            width = 3 if self._variables[name].rotation else centre[name].shape[1]
+            none = np.empty((len(times), width, 0))
+            found.slopes[name] = np.stack(parts, axis=2) if parts else none
             size = self._size(name, centre)
-            found.noise[name] = _ROUNDING * size / self._steps
+            found.noise[name] = ROUNDING * size / self._steps
         return found
 
     def _size(self, name: str, centre: dict[str, np.ndarray]) -> float:
@@ -747,8 +760,10 @@ class ByTangents:
     ) -> None:
         """Compile; ``times``: s, of all observations."""
         self._names = list(dict.fromkeys(one.variable for one in quantities))
-        self._keys = [one.key for one in keys.all]
-        self._sizes = np.array([one.size for one in keys.all])
+        self._keys = [one.key for one in keys.motion]
+        self._sizes = np.array([one.size for one in keys.motion])
+        what = Problem("[fit] parameters", "no number of the motion is estimated")
+        ensure(self._keys, ConfigError(what))
         integrator = quiet.config.integrator.model_copy(update={"method": DEFAULT_METHOD})
         stepping = replace(quiet, config=quiet.config.model_copy(update={"integrator": integrator}))
         if prepare(stepping).system.wide:
@@ -779,7 +794,7 @@ class ByTangents:
             value = made.values[name] = rows.values[name]
             made.slopes[name] = np.ascontiguousarray(rows.slopes[name].transpose(0, 2, 1))
             size = 1.0 if name == QUATERNION else float(np.abs(value).max()) or 1.0
-            made.noise[name] = _ROUNDING * size / self._sizes
+            made.noise[name] = ROUNDING * size / self._sizes
             if not (np.isfinite(value).all() and np.isfinite(made.slopes[name]).all()):
                 raise NotPredicted(f"{name} has no finite value at each observation")
         return made
