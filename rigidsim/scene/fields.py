@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date, time
 from decimal import Decimal
 from fractions import Fraction
@@ -20,6 +20,7 @@ from pydantic import (
     Field,
     PlainValidator,
     StrictStr,
+    ValidationError,
     WithJsonSchema,
     model_validator,
 )
@@ -92,6 +93,19 @@ def only_with(key: str, *others: str) -> Rule:
     return rule
 
 
+@dataclass(frozen=True)
+class Never:
+    """A rule of its own: what a table is refused with, at one of its keys, where a condition holds."""
+
+    holds: Callable[[Any], Any]
+    text: str
+    key: str = ""
+
+    def __call__(self, table: Any) -> str:
+        """As for other rules."""
+        return self.text if self.holds(table) else ""
+
+
 class ConfigTable(BaseModel):
     """A TOML table: unknown keys are errors, values never change after reading, and the text below a key
     describes it. Its ``rules`` are about several keys together.
@@ -109,8 +123,9 @@ class ConfigTable(BaseModel):
 
     @model_validator(mode="after")
     def _as_a_whole(self) -> Self:
-        for what in filter(None, (rule(self) for rule in self.rules)):
-            raise refuse(what)
+        for rule in self.rules:
+            if what := rule(self):
+                raise refuse(what, getattr(rule, "key", ""))
         return self
 
 
@@ -131,9 +146,9 @@ def name_or_vector(allowed: str) -> Discriminator:
     )
 
 
-def refuse(text: str) -> PydanticCustomError:
-    """The error with which a validator refuses a value; the text is shown as it is."""
-    return PydanticCustomError("rigidsim", "{text}", {"text": text})
+def refuse(text: str, key: str = "") -> PydanticCustomError:
+    """The error with which a validator refuses a value, or a table at a key; the text is shown as it is."""
+    return PydanticCustomError("rigidsim", "{text}", {"text": text, "key": key})
 
 
 def reading(parse: Callable[[Any], Any]) -> PlainValidator:
@@ -180,12 +195,13 @@ _KINDS = {"m": "length", "s": "time", "1/s": "rate", "rad/s": "rate"}
 
 @dataclass(frozen=True)
 class Range:
-    """Annotation of a number: whether its value in SI (mpf) is allowed, and how messages say it. It is asked
-    of a config's numbers, and of those that take their place, as in members of a sweep.
+    """Annotation of a number: whether its value in SI (mpf) is allowed, and how messages and JSON schemas say
+    it. It is asked of a config's numbers, and of those that take their place, as in members of a sweep.
     """
 
     holds: Callable[[Any], bool]
     allowed: str
+    limits: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def checked(self, number: ExactNumber, context: Any = None) -> ExactNumber:
         """The number, which may stand for all members' numbers in their context; ValueError if it is out."""
@@ -204,14 +220,21 @@ class Range:
 
         return core_schema.no_info_after_validator_function(validate, handler(source))
 
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
+        found: dict[str, Any] = handler(schema)
+        for kind in found.get("anyOf", ()):  # numbers written as strings are checked by rigidsim
+            kind |= self.limits if kind.get("type") == "number" else {}
+        return found
 
-Positive = Annotated[T, Range(lambda x: x > 0, "a positive {}")]
-NotNegative = Annotated[T, Range(lambda x: x >= 0, "zero or more")]
+
+Positive = Annotated[T, Range(lambda x: x > 0, "a positive {}", {"exclusiveMinimum": 0})]
+NotNegative = Annotated[T, Range(lambda x: x >= 0, "zero or more", {"minimum": 0})]
 
 
 def within(least: str, most: str) -> Range:
     """Annotation of a number from one to another."""
-    return Range(lambda x: Fraction(least) <= x <= Fraction(most), f"{least} to {most}")
+    limits = {"minimum": float(least), "maximum": float(most)}
+    return Range(lambda x: Fraction(least) <= x <= Fraction(most), f"{least} to {most}", limits)
 
 
 def _not_zero(value: list[ExactNumber]) -> list[ExactNumber]:
@@ -326,6 +349,30 @@ class OneOf:
         if self.of_scene:
             return {"anyOf": [{"enum": [*self.more, *self.names]}, {"type": "string"}]}
         return {"type": "string", "enum": [*self.more, *self.names]}
+
+
+@dataclass(frozen=True, eq=False)
+class OrWord:
+    """Annotation of a value of a type that may be one of some words instead; ``allowed`` says what it may."""
+
+    words: tuple[str, ...]
+    kind: Any
+    allowed: str
+
+    def _read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
+        if isinstance(value, str) and value in self.words:
+            return value
+        try:
+            return inner(value)
+        except ValidationError:
+            allowed = f"{', '.join(self.words)}, or {self.allowed}"
+            raise refuse(f"given {shown(value)}; allowed: {allowed}") from None
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        return core_schema.no_info_wrap_validator_function(self._read, handler.generate_schema(self.kind))
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
+        return {"anyOf": [{"type": "string", "enum": list(self.words)}, handler(schema)]}
 
 
 def named(pattern: str, allowed: str) -> AfterValidator:

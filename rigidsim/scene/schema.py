@@ -13,9 +13,10 @@ from decimal import Decimal
 from fractions import Fraction
 from functools import lru_cache, partial
 from itertools import islice
-from typing import Annotated, Any, Literal, Self, Union
+from typing import Annotated, Any, Literal, Self, Union, get_args
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     Field,
     StrictBool,
@@ -28,13 +29,14 @@ from pydantic import (
     field_validator,
     model_validator,
 )
+from pydantic.json_schema import GenerateJsonSchema
 
 from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.scene import units
 from rigidsim.scene.bodies.body import Body, Matter
 from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.scene.choices import AUTO, DEFAULT_METHOD, FORMULATIONS, METHODS, ORBIT_AVERAGED, REDUCED
-from rigidsim.scene.exact import ZERO, ExactNumber, parse_number
+from rigidsim.scene.exact import ZERO, ExactNumber
 from rigidsim.scene.expressions.names import BODY_NAMES
 from rigidsim.scene.expressions.tree import RESERVED
 from rigidsim.scene.fields import (
@@ -53,9 +55,11 @@ from rigidsim.scene.fields import (
     Metre,
     Moment,
     Momentum,
+    Never,
     NotNegative,
     NotZero,
     OneOf,
+    OrWord,
     Pair,
     Positive,
     Range,
@@ -175,6 +179,14 @@ class Initial(Motion):
 class Model(ConfigTable):
     """``[model]``: every rotation, or the motion averaged over it, or over the sources' orbits as well."""
 
+    rules = tuple(
+        Never(
+            lambda table, key=key: key in table.model_fields_set and table.level == "full",
+            f'{key} is given with level = "full", but is for averaged levels: leave it out',
+        )
+        for key in ("order", "start", "geodetic_precession")
+    )
+
     level: Literal["full", "spin_averaged", "orbit_averaged", "auto"] = "full"
     """full resolves every rotation; spin_averaged follows the direction of the angular momentum, and its size
     and energy under torques that do work, averaged over the body's free rotation; orbit_averaged averages
@@ -192,13 +204,6 @@ class Model(ConfigTable):
     """whether [initial] is the motion at that moment, or the averaged one already, as published poles are"""
     geodetic_precession: StrictBool = False
     """add the geodetic precession of the body on its orbits (1.92 arcsec a century for the Earth)"""
-
-    @model_validator(mode="after")
-    def _of_averages(self) -> Self:
-        given = [key for key in ("order", "start", "geodetic_precession") if key in self.model_fields_set]
-        if given and self.level == "full":
-            raise refuse(f'{given[0]} is given with level = "full", but is for averaged levels: leave it out')
-        return self
 
     @property
     def reduced(self) -> bool:
@@ -252,8 +257,15 @@ def _states_of(tables: Mapping[str, Any]) -> Iterator[Any]:
 class Output(ConfigTable):
     """``[output]``: what is kept and how it is shown."""
 
+    rules = (
+        Never(
+            lambda table: table.tip is not None and table.record is not None and "tip" not in table.record,
+            'a tip is given, but record has no "tip"; name it there, or leave tip out',
+        ),
+    )
+
     record: EachOnce[Annotated[str, OneOf(OBSERVABLES, of_scene=_states_of)]] | None = Field(
-        None, examples=[["quaternion", "obliquity"]]
+        None, min_length=1, examples=[["quaternion", "obliquity"]]
     )
     """names of the variables to record; by default variables that suit the scene (drifts of invariants are
     always recorded)
@@ -268,7 +280,9 @@ class Output(ConfigTable):
     """
     lyapunov: StrictBool = False
     """Lyapunov exponents from variational equations; costs tens of times the plain run"""
-    sensitivity: EachOnce[StrictStr] | None = Field(None, examples=[["initial.angular_velocity[0]"]])
+    sensitivity: EachOnce[StrictStr] | None = Field(
+        None, min_length=1, examples=[["initial.angular_velocity[0]"]]
+    )
     """keys of numbers in the config by which attitude, rates and position are differentiated along the way,
     vectors component by component; initial.attitude stands for a turn of the start, body axes
     """
@@ -288,19 +302,6 @@ class Output(ConfigTable):
     """the point whose path is recorded as tip, in body axes from the reference point; by default the centre
     of mass of a body that turns about another point
     """
-
-    @field_validator("record", "sensitivity")
-    @classmethod
-    def _some(cls, value: list[str] | None) -> list[str] | None:
-        if value is not None and not value:
-            raise refuse("given an empty array; name at least one variable, or leave the key out")
-        return value
-
-    @model_validator(mode="after")
-    def _tip_is_recorded(self) -> Output:
-        if self.tip is not None and self.record is not None and "tip" not in self.record:
-            raise refuse('a tip is given, but record has no "tip"; name it there, or leave tip out')
-        return self
 
 
 class EventTable(ConfigTable):
@@ -343,23 +344,29 @@ class TableText(ConfigTable):
 # A number is carried and stored as a sum of float64 parts, which end at 2^-1074: 250 digits (833 bits) leave
 # room for numbers down to 1e-70.
 LARGEST_DIGITS = 250
-_BELOW_HALF_A_TURN = Range(lambda x: 0 < x < 3, "an angle above 0 and below pi, in rad,")
+_ANGLE_ERROR = {"exclusiveMinimum": 0, "exclusiveMaximum": 3}
+_BELOW_HALF_A_TURN = Range(lambda x: 0 < x < 3, "an angle above 0 and below pi, in rad,", _ANGLE_ERROR)
 PRECISION_NAMES = ("single", "double", "extended", "quadruple")
+_DIGITS = OrWord(
+    PRECISION_NAMES,
+    Annotated[StrictInt, Field(ge=1, le=LARGEST_DIGITS)],
+    f"a number of decimal digits from 1 to {LARGEST_DIGITS}",
+)
+_TOLERANCE = OrWord(
+    ("auto",),
+    Annotated[Dimensionless, Range(lambda x: 0 < x <= 1, "", {"exclusiveMinimum": 0, "maximum": 1})],
+    "a number above 0 and at most 1",
+)
 
 
 class Integrator(ConfigTable):
     """``[integrator]``: how accurately, and in which variables."""
 
-    precision: (
-        Literal["single", "double", "extended", "quadruple"]
-        | Annotated[StrictInt, WithJsonSchema({"type": "integer", "minimum": 1, "maximum": LARGEST_DIGITS})]
-    ) = Field("double", examples=["extended", 50])
+    precision: Annotated[str | int, _DIGITS] = Field("double", examples=["extended", 50])
     """precision of the arithmetic: single, double, extended or quadruple (24, 53, 64 or 113 bits), or a
     number of decimal digits
     """
-    tolerance: Literal["auto"] | Dimensionless = Field(
-        "auto", examples=["auto", 1e-12], json_schema_extra={"x-above": 0, "x-at-most": 1}
-    )
+    tolerance: Annotated[str | ExactNumber, _TOLERANCE] = Field("auto", examples=["auto", 1e-12])
     """error tolerance of each step, relative to the largest component of the state; auto is epsilon in double
     precision, and an eighth of it in most others, where epsilon would truncate the series slightly too early
     """
@@ -373,13 +380,11 @@ class Integrator(ConfigTable):
     method: Annotated[str, OneOf(METHODS)] = Field(
         DEFAULT_METHOD, description="; ".join(f"{x.name}: {x.described}" for x in METHODS.values())
     )
-    hold_invariants: StrictBool | Literal["auto"] = "auto"
+    hold_invariants: Annotated[bool | str, OrWord(("auto",), StrictBool, "true or false")] = "auto"
     """project the state onto its invariants, so that errors of long runs grow far more slowly; auto: from
     step 8192 on, leaving shorter runs unchanged; in sweeps auto means false
     """
-    accuracy: Annotated[Angle, _BELOW_HALF_A_TURN] | None = Field(
-        None, examples=[1e-9], json_schema_extra={"x-above": 0, "x-below": 3}
-    )
+    accuracy: Annotated[Angle, _BELOW_HALF_A_TURN] | None = Field(None, examples=[1e-9])
     """attitude error allowed at the end, instead of precision and tolerance; certified"""
     # version 1.0 promises that the schema shows no unit here
     accuracy_axis: Annotated[Angle, _BELOW_HALF_A_TURN, WithJsonSchema(number_schema("1"))] | None = Field(
@@ -388,46 +393,13 @@ class Integrator(ConfigTable):
     """error (rad) allowed until the end in the directions of the angular momentum and the figure axis; with
     [model] level = "auto" the cheapest model within it is chosen
     """
-    accuracy_position: Positive[Metre] | None = Field(
-        None, examples=["1 um"], json_schema_extra={"x-above": 0}
-    )
+    accuracy_position: Positive[Metre] | None = Field(None, examples=["1 um"])
     """position error allowed at the end if the body flies; certified"""
 
     @property
     def has_steps(self) -> bool:
         """Whether the method integrates in steps; a closed form takes none."""
         return METHODS[self.method].has_steps
-
-    @field_validator("hold_invariants", mode="before")
-    @classmethod
-    def _whether_to_hold(cls, value: Any) -> Any:
-        if isinstance(value, bool) or value == "auto":
-            return value
-        raise refuse(f'given {shown(value)}; true, false or "auto" is allowed')
-
-    @field_validator("precision", mode="before")
-    @classmethod
-    def _known_precision(cls, value: Any) -> Any:
-        whole = isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= LARGEST_DIGITS
-        if whole or (isinstance(value, str) and value in PRECISION_NAMES):
-            return value
-        raise refuse(
-            f"given {shown(value)}; allowed: {', '.join(PRECISION_NAMES)}, "
-            f"or a number of decimal digits from 1 to {LARGEST_DIGITS}"
-        )
-
-    @field_validator("tolerance", mode="before")
-    @classmethod
-    def _positive_tolerance(cls, value: Any) -> Any:
-        if value == "auto":
-            return value
-        try:
-            number = parse_number(value, "1")
-        except ValueError as error:
-            raise refuse(f'{error}; or "auto"') from None
-        if not (number.sign > 0 and float(number) <= 1):
-            raise refuse(f'given {shown(value)}; allowed: above 0 and at most 1, or "auto"')
-        return number
 
 
 KEPT = (
@@ -447,6 +419,30 @@ MOST_EVENTS = 100_000
 class AxisTable(ConfigTable):
     """One axis: the values that a key takes, given in one of seven ways."""
 
+    rules = (
+        one_of(*WAYS),
+        Never(
+            lambda axis: axis.way == "sphere" and (axis.count is None) == (axis.grid is None),
+            "a sphere takes either count (random directions) or grid (polar angles and azimuths), such as "
+            "grid = [16, 32]",
+        ),
+        Never(
+            lambda axis: axis.way in RANDOM[:2] and axis.count is None,
+            "missing; random values need it",
+            "count",
+        ),
+        Never(
+            lambda axis: axis.way not in RANDOM and axis.count is not None,
+            f"given, but is for random values ({', '.join(RANDOM)}); other ways say it themselves: remove it",
+            "count",
+        ),
+        Never(
+            lambda axis: axis.way != "sphere" and axis.grid is not None,
+            "given without sphere; remove it",
+            "grid",
+        ),
+    )
+
     linspace: Triple[Any] | None = None
     """[from, to, count], both ends included"""
     logspace: Triple[Any] | None = None
@@ -463,35 +459,12 @@ class AxisTable(ConfigTable):
     """radius: random directions of a vector with count, or a grid of directions with grid"""
     count: StrictInt | None = Field(None, ge=1)
     """number of random values"""
-    grid: Pair[StrictInt] | None = None
+    grid: Pair[Annotated[StrictInt, Field(ge=1)]] | None = None
     """for sphere: numbers of polar angles (equally spaced in their cosine) and azimuths"""
     name: StrictStr | None = None
     """name of the dimension; by default the last part of the key, or the whole key if the last part names
     a recorded variable
     """
-
-    @model_validator(mode="after")
-    def _one_way(self) -> AxisTable:
-        way = self.way
-        if way == "sphere" and (self.count is None) == (self.grid is None):
-            raise refuse(
-                "a sphere takes either count (random directions) or grid (polar angles and azimuths), "
-                "such as grid = [16, 32]"
-            )
-        if way in ("normal", "uniform") and self.count is None:
-            raise refuse(f"{way} needs a count, such as count = 100")
-        if way not in RANDOM and self.count is not None:
-            raise refuse(f"count is for random values ({', '.join(RANDOM)}); {way} says it itself")
-        if way != "sphere" and self.grid is not None:
-            raise refuse("grid is for sphere alone")
-        return self
-
-    @field_validator("grid")
-    @classmethod
-    def _possible_grid(cls, value: list[int] | None) -> list[int] | None:
-        if value is not None and min(value) < 1:
-            raise refuse(f"given {shown(value)}; two whole numbers of at least 1 are allowed")
-        return value
 
     @property
     def way(self) -> str:
@@ -528,24 +501,37 @@ MOST_STARTS = 10_000
 _ONE_OR_MORE = Range(lambda x: x >= 1, "1 or more")
 
 
+def _sigma(value: Any) -> Any:
+    if isinstance(value, bool | dict) or value is None:
+        raise refuse(
+            f"given {shown(value)}; a standard deviation is allowed, of a vector one for each component, of "
+            "data the name of a column"
+        )
+    return value
+
+
+Sigma = Annotated[Any, AfterValidator(_sigma)]
+
+
 class KnownWithin(ConfigTable):
     """Prior knowledge of a value."""
 
-    sigma: Any = Field(examples=[0.1, "1e10 m^3/s^2", [0.1, 0.1, 0.2]])
+    sigma: Sigma = Field(examples=[0.1, "1e10 m^3/s^2", [0.1, 0.1, 0.2]])
     """standard deviation about the config's value, in the unit of the key; of a vector one for all its
     components, or one for each
     """
 
-    @field_validator("sigma")
-    @classmethod
-    def _number(cls, value: Any) -> Any:
-        if isinstance(value, bool | dict) or value is None:
-            raise refuse(f"given {shown(value)}; a standard deviation, or one for each component, is allowed")
-        return value
-
 
 class FitDataTable(ConfigTable):
     """``[[fit.data]]``: one set of observations with times."""
+
+    rules = (
+        Never(
+            lambda table: isinstance(table.sigma, list),
+            "given an array; a standard deviation for all components, or the name of a column, is allowed",
+            "sigma",
+        ),
+    )
 
     file: StrictStr = Field(examples=["observed.csv"])
     """CSV, Parquet, NumPy, netCDF, AEM, APM, OEM, CK, or the dataset of a run; its path from the config's
@@ -563,7 +549,7 @@ class FitDataTable(ConfigTable):
     """
     unit: StrictStr | None = Field(None, examples=["deg"])
     """unit of these columns; by default the file's, or SI"""
-    sigma: Any = Field(examples=["5 deg", "sigma_deg", 1e-3])
+    sigma: Sigma = Field(examples=["5 deg", "sigma_deg", 1e-3])
     """standard deviation of each component: a number with its unit (bare ones are SI), or the name of a
     column, in ``unit``; of attitudes, of each component of a rotation vector
     """
@@ -574,16 +560,23 @@ class FitDataTable(ConfigTable):
     outliers: Annotated[Dimensionless, _ONE_OR_MORE] | None = Field(None, examples=[4])
     """leave out and report rows with a residual above so many standard deviations; by default none"""
 
-    @field_validator("sigma")
-    @classmethod
-    def _sigma(cls, value: Any) -> Any:
-        if isinstance(value, bool | dict | list) or value is None:
-            raise refuse(f"given {shown(value)}; a standard deviation, or the name of a column, is allowed")
-        return value
-
 
 class FitTable(ConfigTable):
     """``[fit]``: what ``rigidsim fit`` estimates."""
+
+    rules = (
+        Never(
+            lambda table: set(table.parameters) & set(table.consider),
+            "some key is both estimated (parameters) and considered; remove it from one of them",
+            "consider",
+        ),
+        Never(
+            lambda table: table.starts > 1 and not table.prior,
+            "given more than one, but without a prior there is nothing to draw them from; add "
+            'prior."KEY" = {sigma = ...}',
+            "starts",
+        ),
+    )
 
     parameters: EachOnce[StrictStr] = Field(
         min_length=1, examples=[["initial.attitude", "initial.angular_velocity", "body.principal_moments[0]"]]
@@ -599,18 +592,6 @@ class FitTable(ConfigTable):
     """the observations"""
     starts: StrictInt = Field(1, ge=1, le=MOST_STARTS)
     """number of starts: the config's values, and others drawn from the priors; the best result is kept"""
-
-    @model_validator(mode="after")
-    def _either(self) -> FitTable:
-        both = sorted(set(self.parameters) & set(self.consider))
-        if both:
-            raise refuse(f'"{both[0]}" is both estimated and considered; remove it from one of them')
-        if self.starts > 1 and not self.prior:
-            raise refuse(
-                f"starts = {self.starts}, but without a prior there is nothing to draw them from; add "
-                'prior."KEY" = {sigma = ...}'
-            )
-        return self
 
 
 class RotorTable(ConfigTable):
@@ -722,6 +703,21 @@ class OwnStateTable(ConfigTable):
 class Config(ConfigTable):
     """One experiment; ``config_model`` adds the kinds of loads."""
 
+    rules = (
+        Never(
+            lambda config: (
+                config.tides is not None
+                and not (
+                    config.model.level == ORBIT_AVERAGED
+                    and config.model.order == 1
+                    and not config.model.short_period
+                )
+            ),
+            '[tides] is for [model] level = "orbit_averaged" with order = 1, no short_period; change these '
+            "keys, or leave [tides] out",
+        ),
+    )
+
     name: Annotated[StrictStr, named(rf"(?!\.*$){_FOLDER_NAME}", _ABOUT_NAME)] = Field(
         examples=["intermediate_axis"], json_schema_extra={"pattern": _FOLDER_NAME}
     )
@@ -786,15 +782,6 @@ class Config(ConfigTable):
             (key, i, x) for key, tables in bringing for i, table in enumerate(tables)
             for x in table.brought_states()
         ]  # fmt: skip
-
-    @model_validator(mode="after")
-    def _tides_are_of_averages(self) -> Config:
-        model = self.model
-        fits = model.level == ORBIT_AVERAGED and model.order == 1 and not model.short_period
-        if self.tides is not None and not fits:
-            raise refuse('[tides] is for [model] level = "orbit_averaged" with order = 1, no short_period; '
-                         "change these keys, or leave [tides] out")  # fmt: skip
-        return self
 
     @model_validator(mode="after")
     def _dated(self) -> Config:
@@ -944,6 +931,8 @@ def config_error(
     for item in islice(error.errors(include_url=False), _MOST_PROBLEMS):
         # the alternatives of a union each report; their names are no part of the user's key
         path, given = Path(_of_the_user(item["loc"], alternatives)), item["input"]
+        if key := item.get("ctx", {}).get("key"):
+            path = path / key
         if item["type"].startswith("union_tag"):  # kind chooses among tables: kind is the key at fault
             path, given = path / "kind", given.get("kind") if isinstance(given, Mapping) else None
         allowed = partial(path.parent.keys, model, tables)
@@ -954,12 +943,7 @@ def config_error(
 
 # --- as a JSON schema for editors ---------------------------------------------------------------------------
 
-# pydantic's own schema describes a Python object: keys that are left out are null there, defaults are exact
-# numbers, and every key has a title. A TOML file has no null, and an editor shows descriptions, so the schema
-# is rewritten in TOML's terms; it stays within draft 7, which every editor's checker knows.
-
 DRAFT = "http://json-schema.org/draft-07/schema#"
-_LIMITS = {"x-above": "exclusiveMinimum", "x-below": "exclusiveMaximum", "x-at-most": "maximum"}
 
 
 def editor_schema(model: type[Config] | None = None) -> dict[str, Any]:
@@ -973,68 +957,71 @@ def editor_schema(model: type[Config] | None = None) -> dict[str, Any]:
         stands alone as ``x-unit`` too ("" for a number in any unit), and where there are such, ``default``
         and ``examples`` as a user would write them.
     """
-    made = (model or config_model()).model_json_schema()
+    made = (model or config_model()).model_json_schema(schema_generator=_ForEditors)
     # a config's own states can be recorded, too, and a schema can't know their names
-    items = made["$defs"]["Output"]["properties"]["record"]["anyOf"][0]["items"]
-    strictly = {"properties": {"record": {"items": items["anyOf"][0]}}}
+    names = made["$defs"]["Output"]["properties"]["record"]["items"]["anyOf"][0]
+    strictly = {"properties": {"record": {"items": names}}}
     without = {"if": {"not": {"required": ["states"]}}, "then": {"properties": {"output": strictly}}}
-    for name in _brought(made):  # a preset may have the rest of their keys
-        made["$defs"][name].pop("required", None)
-    return {"$schema": DRAFT, **_table(made), **without, "title": "rigidsim config"}
+    for name in {name for preset in PRESETS.values() for name in preset.tables}:
+        table, _ = get_args(Body.model_fields[name].annotation)
+        made["$defs"][table.__name__].pop("required", None)  # a preset may have the rest of their keys
+    return {"$schema": DRAFT, **made, **without, "title": "rigidsim config"}
 
 
-def _brought(made: Mapping[str, Any]) -> set[str]:
-    """Names of the tables of ``[body]`` that presets bring."""
-    keys = made["$defs"]["Body"]["properties"]
-    kinds = [kind for preset in PRESETS.values() for name in preset.tables for kind in keys[name]["anyOf"]]
-    return {kind["$ref"].rsplit("/", 1)[1] for kind in kinds if "$ref" in kind}
+class _ForEditors(GenerateJsonSchema):
+    """A schema in TOML's terms. Pydantic's own describes a Python object: keys that are left out are null
+    there, defaults are exact numbers, and every key has a title. A TOML file has no null, and an editor shows
+    descriptions; all stays within draft 7, which every editor's checker knows.
+    """
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        """False: the key is its own title."""
+        return False
+
+    def nullable_schema(self, schema: Any) -> dict[str, Any]:
+        """A key that may be left out needn't be null."""
+        return self.generate_inner(schema["schema"])
+
+    def default_schema(self, schema: Any) -> dict[str, Any]:
+        """Without the default of such a key."""
+        found = super().default_schema(schema)
+        return {key: value for key, value in found.items() if key != "default" or value is not None}
+
+    def encode_default(self, dft: Any) -> Any:
+        """A default as a user would write it."""
+        if isinstance(dft, list):
+            return [self.encode_default(item) for item in dft]
+        if isinstance(dft, ExactNumber):
+            return int(dft.rational) if dft.rational.denominator == 1 and not dft.pi_power else float(dft)
+        return super().encode_default(dft)
+
+    def model_schema(self, schema: Any) -> dict[str, Any]:
+        """A table: its keys with their units."""
+        table = super().model_schema(schema)
+        words = " ".join(table["description"].replace("``", "").split())
+        table = {
+            **table,
+            "description": words,
+            "properties": dict(map(_described, table["properties"].items())),
+        }
+        if "const" in (kind := table["properties"].get("kind", {})):
+            kind["description"] = words
+        return {key: value for key, value in table.items() if key != "title"}
 
 
-def _table(node: Mapping[str, Any]) -> dict[str, Any]:
-    """A table of keys, or the whole schema with its definitions."""
-    table = {key: value for key, value in node.items() if key not in ("title", "$defs")}
-    if "description" in table:
-        table["description"] = " ".join(table["description"].replace("``", "").split())
-    if "properties" in node:
-        table["properties"] = {key: _key(value) for key, value in node["properties"].items()}
-        kind = table["properties"].get("kind", {})
-        if "const" in kind:
-            kind["description"] = table["description"]
-    if "$defs" in node:
-        table["$defs"] = {name: _table(value) for name, value in node["$defs"].items()}
-    return table
-
-
-def _key(node: Mapping[str, Any]) -> dict[str, Any]:
-    """One key of a table."""
-    key = _without_null({name: value for name, value in node.items() if name != "title"})
+def _described(item: tuple[str, dict[str, Any]]) -> tuple[str, dict[str, Any]]:
+    """A key, its unit in its description."""
+    name, key = item
     if "description" in key:
         key["description"] = " ".join(key["description"].split())
     units = _units(key)
     if len(units) == 1:
-        (unit,) = units
-        key["x-unit"] = unit
-        if unit != "1":
-            shown = f"[{unit}]" if unit else "[SI, or any unit]"
-            key["description"] = f"{key.get('description', '')} {shown}".strip()
-    _bounded(key)
-    if "default" in key:
-        key["default"] = as_written(key["default"])
+        (key["x-unit"],) = units
+        shown = f"[{key['x-unit'] or 'SI, or any unit'}]"
+        key["description"] = f"{key.get('description', '')} {shown if units != {'1'} else ''}".strip()
     if "$ref" in key and len(key) > 1:  # draft 7 ignores anything next to a reference
         key["allOf"] = [{"$ref": key.pop("$ref")}]
-    return key
-
-
-def _without_null(key: dict[str, Any]) -> dict[str, Any]:
-    """The key without null: a key that may be left out needn't be null."""
-    if key.get("default", ...) is None:
-        del key["default"]
-    kinds = key.get("anyOf")
-    if kinds is None:
-        return key
-    kept = [kind for kind in kinds if kind != {"type": "null"}]
-    rest = {name: value for name, value in key.items() if name != "anyOf"}
-    return {**rest, "anyOf": kept} if len(kept) > 1 else {**kept[0], **rest}
+    return name, key
 
 
 def _units(node: Any) -> set[str]:
@@ -1044,28 +1031,3 @@ def _units(node: Any) -> set[str]:
         inner = (value for name, value in node.items() if name not in ("default", "examples"))
         return own.union(*map(_units, inner))
     return set().union(*map(_units, node)) if isinstance(node, list) else set()
-
-
-def _bounded(key: dict[str, Any]) -> None:
-    """Restrict limits to numbers; numbers written as strings are checked by rigidsim."""
-    limits = {_LIMITS[name]: key.pop(name) for name in list(key) if name in _LIMITS}
-    if limits:
-        for kind in _kinds(key):
-            if kind.get("type") == "number":
-                kind.update(limits)
-
-
-def _kinds(node: dict[str, Any]) -> list[dict[str, Any]]:
-    """The alternatives of a key, nested ones included."""
-    inner = [found for kind in node.get("anyOf", []) for found in _kinds(kind)]
-    return inner or [node]
-
-
-def as_written(value: Any) -> Any:
-    """A default as a user would write it; pydantic would take an exact number apart."""
-    if isinstance(value, list):
-        return [as_written(item) for item in value]
-    if not (isinstance(value, Mapping) and "rational" in value):
-        return value
-    number = ExactNumber(Fraction(value["rational"]), value["pi_power"])
-    return int(number.rational) if number.rational.denominator == 1 and not number.pi_power else float(number)
