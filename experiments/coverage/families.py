@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.coverage import carried, deep_time, fields, known, real_bodies, satellites
+from experiments.coverage import carried, deep_time, fields, known, pairs, real_bodies, satellites
 from experiments.coverage.hyperbolic import HYPERBOLIC, hyperbolic_average
 from experiments.coverage.moments import put_late, spike, switch
 from experiments.random_scenes import KINDS, Draw, orbit
@@ -256,6 +256,7 @@ FAMILIES: dict[str, Family] = {
     "plates in air": Family(satellites.plates_in_air, (0.3, 1.7), canonical=False),
     "eddy currents": Family(satellites.eddy_currents, (1.0, 3.0), canonical=False),
     "field of the attractor": Family(satellites.attractor, (0.3, 2.0), canonical=False),
+    "pairs": Family(pairs.pair, (1.0, 2.7), canonical=False),
     DEEP_TIME: Family(deep_time.precession, (3.0, 5.0), finish=deep_time.write_orbit),
 }
 """By the name under which the table shows them."""

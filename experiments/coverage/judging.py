@@ -112,9 +112,8 @@ class Kept(SampleReceiver):
 
 def judge(scene: CoverageScene) -> Judged:
     """Run a scene in memory, with its estimate, and then better."""
-    start = scene.text.partition("[initial]")[2].partition("[[")[0]
-    turned = "momentum_axis" if scene.family == DEEP_TIME else "quaternion"
-    recorded = [turned] + (["position"] if "position = " in start else [])
+    turned, place = _recorded(scene)
+    recorded = [*turned, *place]
     asked = [f"output.record={recorded}".replace("'", '"')]
     begin = Judged(scene.number, scene.family, _setting(scene), "refused", scene.radians)
     try:
@@ -133,11 +132,11 @@ def judge(scene: CoverageScene) -> Judged:
         return replace(begin, ended="no truth")
     announced = found.estimate.attitude
     places = (math.nan, math.nan)
-    if "position" in recorded:
-        places = (float(apart(seen.exact("position"), truth["position"])), found.estimate.position or 0.0)
+    for name in place:
+        places = (float(apart(seen.exact(name), truth[name])), found.estimate.position or 0.0)
     return replace(
         begin,
-        true=angle(seen.exact(turned), truth[turned]),
+        true=max(angle(seen.exact(name), truth[name]) for name in turned),
         announced=math.nan if announced is None else announced,
         true_place=places[0],
         announced_place=places[1],
@@ -193,6 +192,15 @@ def judge_reversal(scene: CoverageScene) -> Judged:
     apart = found.rates if found.attitude is None else found.attitude
     known = {"true": apart or 0.0, "announced": math.nan if found.announced is None else found.announced}
     return replace(begin, ended="finished", steps=found.steps, **known)
+
+
+def _recorded(scene: CoverageScene) -> tuple[list[str], list[str]]:
+    """Names of the attitudes, or axes, and of the position where there is one."""
+    if "[[rigid_bodies]]" in scene.text:
+        return ["quaternion", "rigid_body_quaternion"], ["rigid_body_position"]
+    start = scene.text.partition("[initial]")[2].partition("[[")[0]
+    turned = "momentum_axis" if scene.family == DEEP_TIME else "quaternion"
+    return [turned], ["position"] * ("position = " in start)
 
 
 def _setting(scene: CoverageScene) -> str:

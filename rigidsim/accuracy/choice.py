@@ -28,11 +28,13 @@ from rigidsim.accuracy.comparison import (
     TrialProgress,
     angles_between,
     compactly,
+    compared_names,
     distances_between,
     exact_times,
     finished_trial,
     parts_of,
     rows_to_compare,
+    side_by_side,
     trial_scene,
     try_setting,
 )
@@ -541,17 +543,17 @@ def certify(
     if dataset.sizes["time"] == 0:
         return None
     motion, setting = known or motion_of(experiment, loads=loads), setting_of(experiment)
-    of_path = accuracy_position is not None
+    of_attitude, of_path = compared_names(experiment)
 
     @cache
     def run_at(most: int) -> tuple[list[mpmath.mpf], list[np.ndarray], list[np.ndarray]]:
         """Times, attitudes and places of the run; what it hasn't recorded, of the same run again."""
         rows = rows_to_compare(dataset, most)
         times = exact_times(dataset, rows)
-        names = ["quaternion"] + ["position"] * of_path
-        if all(name in dataset for name in names):
-            attitudes, *places = (parts_of(dataset, name, rows) for name in names)
-            return times, attitudes, places[0] if places else []
+        if all(name in dataset for name in of_attitude + of_path):
+            attitudes = side_by_side([parts_of(dataset, name, rows) for name in of_attitude])
+            places = [part.reshape(-1, 3) for name in of_path for part in parts_of(dataset, name, rows)]
+            return times, attitudes, places
         again = try_setting(experiment, setting, times, loads=loads, repeating=True)
         return times, again.attitudes, again.places
 

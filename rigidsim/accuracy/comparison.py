@@ -70,8 +70,8 @@ class Collected(SampleReceiver):
 
 @dataclass
 class Trial:
-    """Result of a trial: attitudes and places (m; none without a position) as float64 parts (samples, 4 or
-    3), and the relative drift (samples,) of each invariant.
+    """Result of a trial: attitudes and places (m; none without a position) as float64 parts (samples, 4 for
+    each body, or 3), and the relative drift (samples,) of each invariant.
     """
 
     status: Status
@@ -93,6 +93,15 @@ class Trial:
         return float(self.steps) * self.order**2 * self.states
 
 
+def compared_names(experiment: Experiment) -> tuple[list[str], list[str]]:
+    """Names of the attitudes that settings are compared by, and of the path where its accuracy is asked for;
+    of two bodies both attitudes, and the place of the second.
+    """
+    pair, path = bool(experiment.config.rigid_bodies), experiment.config.integrator.accuracy_position
+    attitudes = ["quaternion", "rigid_body_quaternion"][: 1 + pair]
+    return attitudes, ["rigid_body_position" if pair else "position"] * (path is not None)
+
+
 def trial_scene(
     experiment: Experiment,
     setting: Setting,
@@ -104,9 +113,9 @@ def trial_scene(
     accuracy of that is asked for; ``repeating`` holds invariants as the experiment does. Raises
     ``ConfigError``.
     """
-    given = experiment.config.integrator
+    given, (attitudes, path) = experiment.config.integrator, compared_names(experiment)
     changed = experiment.config.as_motion(
-        ["quaternion"] + ["position"] * (given.accuracy_position is not None),
+        attitudes + path,
         precision=setting.precision,
         tolerance="auto",
         formulation=setting.formulation,
@@ -145,7 +154,7 @@ def try_setting(
     if compact:
         prepared = compactly(prepared)
     invariants = [invariant.name for invariant in prepared.system.invariants]
-    recorded = [r.name for r in prepared.system.recorded if r.name in ("quaternion", "position")]
+    attitudes, path = compared_names(experiment)
     start, length, latest = float(scene.start), float(samples.last - scene.start), 0.0
 
     def check(progress: Progress) -> Status | None:
@@ -155,11 +164,11 @@ def try_setting(
             report(setting.title, min(1.0, (progress.time - start) / length))
         return go_on(progress)
 
-    found = Collected(prepared, [*recorded, *(f"{name}_drift" for name in invariants)], check)
+    found = Collected(prepared, [*attitudes, *path, *(f"{name}_drift" for name in invariants)], check)
     return Trial(
         status=found.progress.status,
-        attitudes=[part[early:] for part in found["quaternion"]],
-        places=[part[early:] for part in found["position"]] if "position" in recorded else [],
+        attitudes=side_by_side([found[name] for name in attitudes], early),
+        places=[part[early:] for name in path for part in found[name]],
         histories={x: drift.ravel() for x in invariants for drift in found[f"{x}_drift"][:1]},
         steps=found.progress.steps,
         order=found.parts.order or 0,
@@ -192,14 +201,26 @@ def compactly(prepared: InitialValueProblem) -> InitialValueProblem:
 
 
 def angles_between(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.ndarray:
-    """Rotation angles (n,) in rad between attitudes given as float64 parts (n, 4) of quaternions.
+    """Rotation angles (n,) in rad between attitudes given as float64 parts (n, 4) of quaternions; of several
+    bodies (n, 4 for each) the largest.
 
     Small angles keep their digits: parts are subtracted before anything is rounded.
     """
+    if (bodies := one[0].shape[1] // 4) > 1:
+        rows = [[part.reshape(-1, 4) for part in parts] for parts in (one, other)]
+        return angles_between(*rows).reshape(-1, bodies).max(axis=1)
     opposite = np.einsum("ij,ij->i", one[0], other[0]) < 0
     sign = np.where(opposite, -1.0, 1.0)[:, None]
     chord = np.linalg.norm(_differences(one, [sign * part for part in other]), axis=1)
     return np.asarray(4 * np.arcsin(np.minimum(chord / 2, 1.0)))
+
+
+def side_by_side(attitudes: Sequence[Sequence[np.ndarray]], first: int = 0) -> list[np.ndarray]:
+    """Parts (n, 4 for each body) of the attitudes of several bodies, from a row on."""
+    return [
+        np.concatenate([part.reshape(len(part), -1)[first:] for part in parts], axis=1)
+        for parts in zip(*attitudes, strict=True)
+    ]
 
 
 def distances_between(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.ndarray:

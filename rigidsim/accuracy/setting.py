@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.loads.rigid_bodies import second_body
 from rigidsim.scene.arithmetic import working_bits
 from rigidsim.scene.choices import DEFAULT_FORMULATION, DEFAULT_METHOD, METHODS, attitude_variables
 from rigidsim.scene.config import Experiment
@@ -163,10 +164,13 @@ def wanted(experiment: Experiment) -> float | None:
     found = [] if of_attitude is None else [of_attitude[1]]
     if integrator.accuracy_position is not None:
         scene = build_scene(experiment)
-        if scene.position is None or scene.velocity is None:
-            what = "given, but the scene has no position; give [initial] position or velocity"
+        second = second_body(scene)
+        begun = scene if second is None else second.start
+        place, velocity = begun.position, begun.velocity
+        if place is None or velocity is None:
+            what = "given, but the scene has no position; give [initial] position or velocity, or remove it"
             raise ConfigError(Problem("[integrator] accuracy_position", what), experiment.source)
         seconds = abs(float(scene.samples.last - scene.start))
-        size = math.hypot(*map(float, scene.position)) or math.hypot(*map(float, scene.velocity)) * seconds
+        size = math.hypot(*map(float, place)) or math.hypot(*map(float, velocity)) * seconds
         found.append(min(float(integrator.accuracy_position) / (size or 1.0), _MOST))
     return min(found) if found else None

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 
 from rigidsim.errors import RigidsimError, ensure
+from rigidsim.formats import gubas
 from rigidsim.formats.messages import MESSAGE_COLUMNS, message_columns
 from rigidsim.scene.epochs import DIGITS, Epoch, parse_epoch
 from rigidsim.scene.row_rotations import conjugated, multiplied, turned
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
 
 KINDS = (
     "CSV (.csv, .txt, .dat, .tsv), Parquet, NumPy (.npz), netCDF or HDF5 that xarray reads (.nc, .h5, "
-    ".zarr), AEM, CK (.bc), the qbn.42 of 42"
+    ".zarr), AEM, CK (.bc), the qbn.42 of 42, GUBAS' x_out.bin and LagrangianStateOut*.csv"
 )
 KNOWN_AXES = frozenset(get_args(SpaceAxes))
 """Space axes whose turns to each other are known."""
@@ -74,7 +75,7 @@ class Trajectory:
         narrow: whether the numbers were single precision.
         epochs: times of a message as dates, in place of a column of times.
         axes: the space axes that a message names; empty where none are named.
-        settled: whether a message says that its attitudes are those from body to space axes.
+        settled: whether a message says, or a tool writes only, attitudes from body to space axes.
         resolution: half the last digits of a message's quaternions and rates, whose numbers were converted.
         left_out: names of columns that hold no real numbers.
         notes: what a user should know of how the file was read.
@@ -208,6 +209,19 @@ class Trajectory:
                 raise RigidsimError(f"{self.source}: line {number}: {error}") from None
         return found
 
+    def of_pair(self, name: str) -> tuple[Trajectory, Trajectory]:
+        """The columns of the first of two bodies, and of the second of this name without what marks them,
+        ``rigid_body_`` or its name; times belong to both.
+        """
+        marks = re.compile(rf"(?:rigid_body|{re.escape(name)})_")
+        bare = {one: marks.sub("", one, count=1).replace(f"_{name}_", "_") for one in self.columns}
+        theirs = {one for one in self.columns if marks.match(one)}
+        own = {one: values for one, values in self.columns.items() if one not in theirs}
+        kept = {bare[one]: one for one in self.columns if one in theirs or one == self.timed}
+        units = {new: self.units[one] for new, one in kept.items() if one in self.units}
+        second = {new: self.columns[one] for new, one in kept.items()}
+        return replace(self, columns=own), replace(self, columns=second, units=units, text=None, notes=())
+
     def dated(self) -> Trajectory:
         """With the dates of a column of times, read as UTC, or of Unix time; the same if times are others."""
         if name := self.timed:
@@ -248,7 +262,7 @@ def is_trajectory(path: Path) -> bool:
     suffix = path.suffix.lower()
     if suffix in _XARRAY:
         return not (path.parent / "dataset.h5").exists()
-    return suffix in {*TEXT, ".npz", ".42", ".parquet", ".pq", ".aem", ".apm", ".oem", ".xml"}
+    return suffix in {*TEXT, ".npz", ".42", ".parquet", ".pq", ".aem", ".apm", ".oem", ".xml", ".bin"}
 
 
 def read_columns(path: Path) -> Trajectory:
@@ -277,6 +291,8 @@ def read_columns(path: Path) -> Trajectory:
                 return Trajectory(source=str(path), **message_columns(path, found[1]))
             if suffix == ".42":
                 return _of_42(path)
+            if suffix == ".bin" or gubas.is_table(path):
+                return Trajectory(gubas.read_states(path), str(path), settled=True)
             if suffix in TEXT:
                 return _of_text(path)
     except TableError as error:
@@ -360,6 +376,9 @@ def _of_dataset(dataset: xarray.Dataset, source: str) -> Trajectory:
         variable = dataset.variables[name]
         if along not in variable.dims or str(name).endswith(("_lo", "_lo2")):
             continue
+        variable = variable.squeeze(
+            [dim for dim, size in variable.sizes.items() if size == 1 and dim != along]
+        )
         others = [dim for dim in variable.dims if dim != along]
         labels: tuple[str, ...] = ()
         if len(others) == 1 and others[0] in dataset.coords:

@@ -394,7 +394,7 @@ class Integrator(ConfigTable):
     [model] level = "auto" the cheapest model within it is chosen
     """
     accuracy_position: Positive[Metre] | None = Field(None, examples=["1 um"])
-    """position error allowed at the end if the body flies; certified"""
+    """position error allowed at the end if the body flies, or of a second body; certified"""
 
     @property
     def has_steps(self) -> bool:

@@ -6,6 +6,7 @@ In double precision at its epsilon, with the attitude as a quaternion. States th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -31,7 +32,14 @@ class NotFromStates(Exception):
 
 
 class AnyStart:
-    """A scene's equations in rates and quaternion, which may begin at any attitude and rates."""
+    """A scene's equations in rates and quaternion, which may begin at any attitude and rates.
+
+    Attributes:
+        others: names of further states besides its own and the orbits': of rotors and of users.
+        second: the same of a second body.
+    """
+
+    second: Sequence[str] = ()
 
     def __init__(
         self, scene: Scene, precision: Precision, *, compact: bool = False, forwards: bool = False
@@ -44,14 +52,16 @@ class AnyStart:
         self._options = dict(precision.options, compact_mode=compact or self._system.wide)
         names = self._system.states
         self._places = [names.index(name) for name in (*BODY.quaternion, *BODY.rates)]
-        flight = (*BODY.position, *BODY.velocity)
-        self.flies = all(name in names for name in flight)
-        self._flight = [names.index(name) for name in flight] if self.flies else []
+        flown = self._system.flown
+        flight = [] if flown is None else [*flown.position, *flown.velocity]
+        if flown is not None and flown is not BODY:
+            flight += [*flown.quaternion, *flown.rates]
+            self.second = flight
+        self._flight = [names.index(name) for name in flight]
         orbits = [self._system.mechanics.orbit(tag).block.names for tag in self._system.plan.orbit_tags]
         known = {WORK, PACE, *(name for block in orbits for name in block)}
         taken = {names[place] for place in (*self._places, *self._flight)}
         self.others = [name for name in names if name not in known | taken]
-        """Names of further states besides its own and the orbits': of rotors and of users."""
         self.whole = not set(names) - taken
 
     @property
@@ -121,12 +131,13 @@ class FromStates(AnyStart):
         in ``own``.
 
         Args:
-            flight: positions and velocities (rows, 6), SI, space axes.
+            flight: positions and velocities (rows, 6), SI, space axes; of a second body also its attitudes
+                and rates (rows, 13).
         """
         made = own.copy()
         made[..., self._places[:4]] = quaternions
         made[..., self._places[4:]] = rates / self._scales[self._places[4:]]
-        if flight is not None and self.flies:
+        if flight is not None and flight.shape[-1] == len(self._flight):
             made[..., self._flight] = flight / self._scales[self._flight]
         return made
 
@@ -171,10 +182,6 @@ class FromStates(AnyStart):
         rates = states[..., self._places[4:]] * self._scales[self._places[4:]]
         return states[..., slice(first, last + 1) if together else self._places[:4]], rates
 
-    def flight(self, states: np.ndarray) -> np.ndarray | None:
-        """Positions and velocities (rows, 6), SI, space axes, of states; None for a body that only turns."""
-        return states[:, self._flight] * self._scales[self._flight] if self.flies else None
-
     def drifts(self, states: RowStates, times: np.ndarray) -> dict[str, np.ndarray]:
         """Drift of each invariant from the first row on, relative to its scale."""
         invariants = self._system.invariants
@@ -196,7 +203,7 @@ class RowStates:
     Attributes:
         own: states (rows, states) of the scene's own motion, internal units.
         quaternions: (rows, 4), w x y z, of norm one. rates: (rows, 3), rad/s, body axes.
-        flight: positions and velocities (rows, 6), SI, space axes, if known.
+        flight: see ``FromStates.states``, if known.
     """
 
     equations: FromStates

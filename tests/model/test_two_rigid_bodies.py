@@ -525,6 +525,24 @@ def test_announced_errors_are_those_of_both_bodies() -> None:
     assert_announced(announced[1::2], true[1::2])
 
 
+def test_certificates_hold_for_both_bodies_and_the_path() -> None:
+    """Of a second body that turns fast, at a loose tolerance, against 80 bits."""
+    start = "velocity = [0, 0.1714, 0.001]\nangular_velocity = [1e-3, 2e-3, 3e-3]"
+    given = (
+        'precision = "double"\ntolerance = 1e-7\nmethod = "taylor"\naccuracy = 1e-3\naccuracy_position = 1'
+    )
+    time, degree = "end = 2e4\nsamples = 9", "degree = 2"
+    run = run_text(didymos(DIMORPHOS + start, load=degree, time=time, integrator=given))
+    other = didymos(DIMORPHOS + start, load=degree, time=time, integrator='precision = "extended"')
+    own, better = loaded(run), loaded(run_text(other))
+    both = ("quaternion", "rigid_body_quaternion")
+    one, second = (angle_between(*(x[q].values.reshape(-1, 4) for x in (own, better))).max() for q in both)
+    apart = np.linalg.norm(own["rigid_body_position"] - better["rigid_body_position"], axis=-1).max()
+    accuracy = run.summary["accuracy"]
+    assert 10 * one < second <= accuracy["certified"] < 4 * second
+    assert apart <= accuracy["certified_position"] < 4 * apart
+
+
 CLASSES = [(1.2, 1.1, False), (1.1, 1.3, False), (1.2, 1.5, False)]
 CLASSES += [(1.2, 1.4, True), (1.3, 1.4, True), (1.4, 1.4, True), (1.4, 1.2, True), (1.5, 1.3, True)]
 """a/b, b/c, and whether Dimorphos rolls over within a year after the impact (Agrusa et al. 2021)."""

@@ -243,3 +243,65 @@ def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
     long = {"t": 10 * motion.times, "q": q, "w": motion.rates}
     refused(long, "longer than the experiment by 52 s; set a later .time. end", offset="estimate")
     refused(still, 'offset: .*a time, "first" or "estimate" is allowed', offset="soon")
+
+
+# --- two bodies ---------------------------------------------------------------------------------------------
+
+PAIR = """name = "pair"
+body = {shape = "ellipsoid", mass = 5.24e11, semi_axes = [431, 419, 310]}
+loads = [{kind = "mutual_gravity"}]
+time = {end = 1e4, every = 250}
+output = {timeline = false, estimate = false}
+[initial]
+angular_velocity = SPIN
+[[rigid_bodies]]
+name = "moonlet"
+shape = "ellipsoid"
+mass = 4.8e9
+semi_axes = [103, 79, 66]
+position = [1190, 0, 0]
+angular_velocity = [0, 1e-6, 1.46e-4]
+velocity = SPEED
+"""
+
+
+def gubas(run: rigidsim.Run, folder: Path, rng: np.random.Generator, slip: float) -> Path:
+    """As GUBAS writes the motion of a run, in binary or as a table; ``slip``: of the second body, rad."""
+    data = run.dataset
+    second = {x: data[f"rigid_body_{x}"].values[:, 0] for x in ("quaternion", "position", "velocity")}
+    a = Rotation.from_quat(np.roll(data["quaternion"].values, -1, axis=1))
+    b = Rotation.from_quat(np.roll(second["quaternion"], -1, axis=1)) * Rotation.from_rotvec([0, slip, 0])
+    place, speed = (a.inv().apply(second[x]) for x in ("position", "velocity"))
+    spin, other = data["angular_velocity"].values, data["rigid_body_angular_velocity"].values[:, 0]
+    relative, turn = ((x).as_matrix().reshape(-1, 9) for x in (a.inv() * b, a))
+    times = data["time"].values
+    if rng.integers(2):
+        named, timed = folder / "output_x" / "x_out.bin", folder / "output_t" / "t_out.bin"
+        for path in (named, timed):
+            path.parent.mkdir()
+        seen = (a.inv() * b).apply(other)
+        np.column_stack([place / 1e3, speed / 1e3, spin, seen, turn, relative]).astype("<f8").tofile(named)
+        times.astype("<f8").tofile(timed)
+        return named
+    rows = joined(times, place, speed, spin, other, relative, turn, 0 * times)
+    return table(folder / "LagrangianStateOut_40000.0_0.0_30.0_4_3_it.csv", "", rows)
+
+
+@pytest.mark.parametrize("seed", seeds(1, 10))
+def test_states_of_gubas_are_compared(seed: int, tmp_path: Path) -> None:
+    """Or a run of both bodies; the motion is in 80 bits, and a second body that is turned is seen."""
+    rng = np.random.default_rng(seed)
+    speed = np.array([0, 0.173, 0]) + rng.uniform(-2e-3, 2e-3, 3)
+    spin = np.array([0, 0, 7.7e-4]) + rng.uniform(-4e-5, 4e-5, 3)
+    scene = rigidsim.parse(PAIR.replace("SPEED", str(speed.tolist())).replace("SPIN", str(spin.tolist())))
+    run = rigidsim.run(scene, changes={"integrator.precision": "extended"}, out=None)
+    slip = float(rng.choice([0.0, 1e-6]))
+    found = rigidsim.compare(scene, gubas(run, tmp_path, rng, slip) if slip or rng.integers(3) else run)
+    assert found.verdict == ("undecided" if slip else "agrees"), found.why
+    assert found.attitude_error.largest == pytest.approx(slip, abs=3e-12, rel=1e-4)
+    assert found.position_error < 1e-7
+    assert found.rate_error < 1e-14
+    assert found.local_defects.largest < 1e-12
+    drifts = {x.name: x.largest for x in found.drifts}
+    assert drifts.keys() >= {"energy", "angular_momentum"}
+    assert max(drifts.values()) < 1e-13 + 1e-3 * slip

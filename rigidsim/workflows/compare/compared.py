@@ -23,10 +23,11 @@ from rigidsim.workflows.compare.conventions import (
     Convention,
     attitudes_of,
     find_convention,
+    holds_attitude,
     size_of,
 )
 from rigidsim.workflows.compare.defects import rms
-from rigidsim.workflows.compare.evidence import Evidence, judged
+from rigidsim.workflows.compare.evidence import Evidence, Partner, judged
 from rigidsim.workflows.compare.offsets import shifted
 from rigidsim.workflows.read import Given, as_experiment
 from rigidsim.workflows.run import Sampled, sampled
@@ -215,7 +216,11 @@ def compare(
     _refuse_names(paths)
     refuse_loss(paths.values(), [*asked.files, *files_of(table, kernels)], force=force)
     quiet, scene = _plain(asked)
-    given = attitudes_of(trajectory_given(table, scene, kernels), scene.epoch)
+    trajectory, partner = trajectory_given(table, scene, kernels), None
+    if asked.config.rigid_bodies:
+        trajectory, second = trajectory.of_pair(asked.config.rigid_bodies[0].name)
+        partner = attitudes_of(second, scene.epoch) if holds_attitude(second) else None
+    given = attitudes_of(trajectory, scene.epoch)
     if not 0 < within < np.pi:
         raise RigidsimError(f"within: given {within:g}; an angle above 0 and below pi, in rad, is allowed")
     span = float(scene.start), float(scene.samples.last)
@@ -233,7 +238,8 @@ def compare(
     given, own = given.at(made.reached), made.dataset
     motion = own["quaternion"].values, own["angular_velocity"].values
     found, more = find_convention(given, convention or {}, motion, float(scene.start))
-    seen = Evidence(given, found, own, made.attitude_error or 0.0, within, notes + more, scene)
+    both = None if partner is None else _second(partner.at(made.reached), own, float(scene.start))
+    seen = Evidence(given, found, own, made.attitude_error or 0.0, within, notes + more, scene, both)
     result = _result(seen, asked.config.name, {name: str(path) for name, path in paths.items()})
     if out is not None:
         result.save(out)
@@ -243,6 +249,15 @@ def compare(
     if timeline is not None:
         _draw(quiet, given, found, Path(timeline))
     return result
+
+
+def _second(given: Attitudes, own: xarray.Dataset, begin: float) -> Partner:
+    """The second of two bodies, in the convention nearest to the experiment's."""
+    known = own["rigid_body_quaternion"].values[:, 0], own["rigid_body_angular_velocity"].values[:, 0]
+    found, _ = find_convention(given, {"offset": "none"}, known, begin)
+    quaternions = found.quaternions(given)
+    rates = None if given.rates is None else found.rates(given.rates, quaternions)
+    return Partner(quaternions, rates, given.positions, given.velocities)
 
 
 def _refuse_names(paths: Mapping[str, Path]) -> None:
@@ -284,6 +299,8 @@ def _plain(experiment: Experiment) -> tuple[Experiment, Scene]:
         raise ConfigError(Problem("[sweep]", what), experiment.source)
     flies = config.initial.position is not None or config.initial.velocity is not None
     names = ["quaternion", "angular_velocity", *(["position"] if flies else [])]
+    if config.rigid_bodies:
+        names += [f"rigid_body_{name}" for name in ("quaternion", "angular_velocity", "position")]
     quiet = experiment.quiet(names, estimate=config.output.estimate)
     return quiet, build_scene(quiet)
 

@@ -87,6 +87,11 @@ class Attitudes:
         return replace(self, trajectory=self.trajectory.at(rows), **some)
 
 
+def holds_attitude(found: Trajectory) -> bool:
+    """Whether there is an attitude among the columns."""
+    return any(kind in ATTITUDES for kind in columns_of(found.columns))
+
+
 def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
     """Find time, attitude, rates and positions among the columns, and refuse rows that can't be used.
 

@@ -7,6 +7,7 @@ integration errs, its model is another one, or the two can't be separated.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -61,6 +62,25 @@ _SAME = 3.0  # factor within which the rates' first difference is what the attit
 _AGREE = 10.0  # times the attitude's floor per radian of the motion, that rates may differ by and agree
 
 
+@dataclass(frozen=True)
+class Partner:
+    """The second of two bodies in a trajectory: what is known of its attitudes (rows, 4), rates, and of its
+    positions and velocities from the first, (rows, 3) each, SI, space axes, rates in body axes.
+    """
+
+    quaternions: np.ndarray
+    rates: np.ndarray | None
+    positions: np.ndarray | None
+    velocities: np.ndarray | None
+
+    @property
+    def states(self) -> np.ndarray | None:
+        """All of these (rows, 13); None where one is unknown."""
+        parts = [self.positions, self.velocities, self.quaternions, self.rates]
+        known = [part for part in parts if part is not None]
+        return np.concatenate(known, axis=1) if len(known) == len(parts) else None
+
+
 class Evidence:
     """A trajectory in a convention with the experiment's motion; what costs time is worked out when needed.
 
@@ -69,7 +89,7 @@ class Evidence:
         rates, own_rates: of the file and of the experiment, (rows, 3), rad/s, body axes; None if unknown.
         begin: the row nearest to the experiment's start.
         errors: angles (rows,), rad, between the attitudes. rate_errors, position_errors: (rows,), SI; None
-            where one of both has none.
+            where one of both has none. Of two bodies the larger ones, and the positions of the second.
         rate: of the motion, rad/s: the experiment's, or that at which the file's attitudes turn, if larger.
         turn: from row to row, rad (median), by the faster of both motions.
         resolution, rate_noise: of attitudes (rad) and rates (rad/s) by the digits that they are written in.
@@ -81,7 +101,7 @@ class Evidence:
 
     def __init__(
         self, given: Attitudes, convention: Convention, own: xarray.Dataset, uncertainty: float,
-        within: float, notes: list[str], scene: Scene,
+        within: float, notes: list[str], scene: Scene, partner: Partner | None = None,
     ) -> None:  # fmt: skip
         """Read the rows.
 
@@ -89,7 +109,9 @@ class Evidence:
             own: the experiment at the trajectory's times. uncertainty: announced error of its attitude, rad.
             within: rad, what attitudes may differ by and agree. notes: gets what a user should know.
             scene: of the experiment, whose equations each row may start.
+            partner: the second of two bodies, if the file has it.
         """
+        self._partner = partner
         self.given, self.convention, self.notes = given, convention, notes
         self._uncertainty, self._within = uncertainty, within
         self.explained: WindowsOfAttitudes | None = None
@@ -106,6 +128,8 @@ class Evidence:
         self.position_errors = (
             np.linalg.norm(theirs - own["position"].values, axis=1) if known and theirs is not None else None
         )
+        if partner is not None:
+            self._see(partner, own)
         steps = np.diff(self.times)
         turns = angles_between(self.quaternions[:-1], self.quaternions[1:])
         seen = float(np.sqrt(np.sum(turns**2 / steps) / self.span))
@@ -128,6 +152,19 @@ class Evidence:
         except NotFromStates as error:
             self.why_not = str(error)
             notes.append(f"neither local defects nor drifts were measured: {error}")
+
+    def _see(self, partner: Partner, own: xarray.Dataset) -> None:
+        """Errors of two bodies, of which the larger count."""
+        known = {
+            x: own[f"rigid_body_{x}"].values[:, 0] for x in ("quaternion", "angular_velocity", "position")
+        }
+        turned = angles_between(partner.quaternions, normalised(known["quaternion"]))
+        self.errors = np.maximum(self.errors, turned)
+        if partner.rates is not None and self.rate_errors is not None:
+            slips = np.linalg.norm(partner.rates - known["angular_velocity"], axis=1)
+            self.rate_errors = np.maximum(self.rate_errors, slips)
+        if partner.positions is not None:
+            self.position_errors = np.linalg.norm(partner.positions - known["position"], axis=1)
 
     @cached_property
     def floor(self) -> tuple[float, str]:
@@ -170,11 +207,12 @@ class Evidence:
     def _states_of(self, equations: FromStates) -> RowStates:
         """Each row as a start of the experiment's equations."""
         given, rates = self.given, self.own_rates if self.rates is None else self.rates
-        flight = None
+        flight = None if self._partner is None else self._partner.states
         if given.positions is not None and given.velocities is not None:
             flight = np.concatenate([given.positions, given.velocities], axis=1)
-        if equations.others:
-            names = ", ".join(equations.others)
+        missing = [*equations.others, *(equations.second if flight is None else ())]
+        if missing:
+            names = ", ".join(missing)
             self.notes.append(f"the file has no {names}: each interval begins with the experiment's own")
         return RowStates(equations, equations.motion(self.times), self.quaternions, rates, flight)
 
@@ -183,7 +221,8 @@ class Evidence:
         if self.states is None:
             return {}
         found = {} if self.rates is None else self.states.equations.drifts(self.states, self.times)
-        found.pop(_NORM, None)  # of quaternions that were normalised
+        for name in (_NORM, f"rigid_body_{_NORM}"):  # of quaternions that were normalised
+            found.pop(name, None)
         if self.given.kind == QUATERNION:
             norms = np.linalg.norm(self.given.attitude, axis=1)
             found[_NORM] = norms / norms[0] - 1
