@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import ast
-import inspect
 import re
-import sys
-from collections import ChainMap
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import date, time
 from decimal import Decimal
 from fractions import Fraction
-from functools import lru_cache
-from itertools import pairwise, product
+from itertools import product
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 from pydantic import (
@@ -112,26 +106,6 @@ class Never:
         return self.text if self.holds(table) else ""
 
 
-@lru_cache(None)
-def _texts_below(module: str) -> dict[str, dict[str, str]]:
-    """Of the classes of a module, by qualified names, the texts below their attributes. They are read when a
-    schema is asked for: pydantic would read them at every start, in a third of its time.
-    """
-    found: dict[str, dict[str, str]] = {}
-
-    def read(body: list[ast.stmt], around: str) -> None:
-        for one, below in pairwise([*body, ast.Pass()]):
-            match one, below:
-                case ast.ClassDef(), _:
-                    read(one.body, f"{around}{one.name}.")
-                case ast.AnnAssign(target=ast.Name(key)), ast.Expr(ast.Constant(str(text))):
-                    found.setdefault(around[:-1], {})[key] = inspect.cleandoc(text)
-
-    with suppress(KeyError, OSError, TypeError):  # classes without a file
-        read(ast.parse(inspect.getsource(sys.modules[module])).body, "")
-    return found
-
-
 class ConfigTable(BaseModel):
     """A TOML table: unknown keys are errors, values never change after reading, and the text below a key
     describes it. Its ``rules`` are about several keys together.
@@ -145,15 +119,6 @@ class ConfigTable(BaseModel):
         arbitrary_types_allowed=True,
         defer_build=True,
     )
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, schema: Any, handler: Any) -> dict[str, Any]:
-        made: dict[str, Any] = handler(schema)
-        keys = handler.resolve_ref_schema(made).get("properties", {})
-        said = ChainMap(*(_texts_below(one.__module__).get(one.__qualname__, {}) for one in cls.__mro__))
-        for key in keys.keys() & said.keys():
-            keys[key].setdefault("description", said[key])
-        return made
 
     @model_validator(mode="after")
     def _as_a_whole(self) -> Self:

@@ -6,13 +6,18 @@ axis without inertia, ...) is checked where the scene is built.
 
 from __future__ import annotations
 
+import ast
+import inspect
 import math
 import re
+import sys
+from collections import ChainMap
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from decimal import Decimal
 from fractions import Fraction
 from functools import lru_cache, partial
-from itertools import islice
+from itertools import islice, pairwise
 from typing import Annotated, Any, Literal, Self, Union, get_args
 
 from pydantic import (
@@ -999,6 +1004,10 @@ class _ForEditors(GenerateJsonSchema):
         """A table: its keys with their units."""
         table = super().model_schema(schema)
         words = " ".join(table["description"].replace("``", "").split())
+        mro = schema["cls"].__mro__
+        said = ChainMap(*(_texts_below(one.__module__).get(one.__qualname__, {}) for one in mro))
+        for name in table["properties"].keys() & said.keys():
+            table["properties"][name].setdefault("description", said[name])
         table = {
             **table,
             "description": words,
@@ -1031,3 +1040,23 @@ def _units(node: Any) -> set[str]:
         inner = (value for name, value in node.items() if name not in ("default", "examples"))
         return own.union(*map(_units, inner))
     return set().union(*map(_units, node)) if isinstance(node, list) else set()
+
+
+@lru_cache(None)
+def _texts_below(module: str) -> dict[str, dict[str, str]]:
+    """Of the classes of a module, by qualified names, the texts below their attributes. They are read when a
+    schema is asked for: pydantic would read them at every start, in a third of its time.
+    """
+    found: dict[str, dict[str, str]] = {}
+
+    def read(body: list[ast.stmt], around: str) -> None:
+        for one, below in pairwise([*body, ast.Pass()]):
+            match one, below:
+                case ast.ClassDef(), _:
+                    read(one.body, f"{around}{one.name}.")
+                case ast.AnnAssign(target=ast.Name(key)), ast.Expr(ast.Constant(str(text))):
+                    found.setdefault(around[:-1], {})[key] = inspect.cleandoc(text)
+
+    with suppress(KeyError, OSError, TypeError):  # classes without a file
+        read(ast.parse(inspect.getsource(sys.modules[module])).body, "")
+    return found
