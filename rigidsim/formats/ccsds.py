@@ -30,8 +30,7 @@ from rigidsim.formats.tables import Table, TableColumn
 from rigidsim.scene.attitude import euler_from_matrix, rotation_matrix, unit_quaternion
 from rigidsim.scene.epochs import DIGITS, SCALES, Epoch
 from rigidsim.scene.exact import parse_number
-from rigidsim.scene.rotations import product
-from rigidsim.scene.row_rotations import SEQUENCES
+from rigidsim.scene.rotations import SEQUENCES, product
 from rigidsim.scene.space_axes import ECLIPTIC, EQUATOR, OBLIQUITY, SpaceAxes, obliquity, to_equator
 from rigidsim.scene.validation_messages import nearest, shown
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidsim.scene.row_rotations import of_vector
+from rigidsim.scene.rotations import of_vector
 from rigidsim.scene.text_tables import name_and_unit
 
 QUATERNION, MATRIX, ANGLES = "quaternion", "matrix", "angles"

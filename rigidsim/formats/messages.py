@@ -29,14 +29,14 @@ import numpy as np
 from rigidsim.errors import RigidsimError, ensure
 from rigidsim.formats.digits import FEW, written_resolution
 from rigidsim.scene.epochs import SCALES, Epoch, parse_epoch
-from rigidsim.scene.rotations import rotation_matrix
-from rigidsim.scene.row_rotations import (
+from rigidsim.scene.rotations import (
     SEQUENCES,
     TURNS,
     conjugated,
     multiplied,
     normalised,
     of_euler,
+    rotation_matrix,
     turned,
     vector_of,
 )

@@ -23,7 +23,7 @@ from rigidsim.errors import RigidsimError, ensure
 from rigidsim.formats import gubas
 from rigidsim.formats.messages import MESSAGE_COLUMNS, message_columns
 from rigidsim.scene.epochs import DIGITS, Epoch, parse_epoch
-from rigidsim.scene.row_rotations import conjugated, multiplied, turned
+from rigidsim.scene.rotations import conjugated, multiplied, turned
 from rigidsim.scene.space_axes import ECLIPTIC, SpaceAxes, from_equator
 from rigidsim.scene.text_tables import (
     TableError,

@@ -10,7 +10,7 @@ heyoka's own treatment of expressions, and what is done about it here:
 - The Taylor series of ``x**n`` divides by x for every n but 2, so a state that passes through zero ends as
   NaN: whole powers are products of squares.
 - ``x**0.5`` and the other fractional powers have no series at zero; what is a square there is rewritten with
-  a sign (``rigidsim.scene.expressions.piecewise``).
+  a sign (``rigidsim.scene.expressions.tree``).
 - The step is chosen from the series' last terms. They vanish at x = 0 for powers above the method's order
   (20 in double, less with a loose tolerance), and far from a short pulse in t: both can be stepped over.
 """

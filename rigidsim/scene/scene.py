@@ -14,9 +14,16 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.scene import starts, units
 from rigidsim.scene.arithmetic import Matrix, Vector, context_for, cross, diagonal, dot, eigen
-from rigidsim.scene.bodies.body import Body, RigidBody, build_body, field_of_mesh, inverse_inertia
+from rigidsim.scene.bodies.body import (
+    Body,
+    RigidBody,
+    build_body,
+    field_of_mesh,
+    inverse_inertia,
+    surfaces_of,
+    with_surfaces,
+)
 from rigidsim.scene.bodies.gravity_field import asked_degree, gravity_field_of
-from rigidsim.scene.bodies.outside import surfaces_of, with_surfaces
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import EULER_NAMES, PROVIDERS, Names, names_of

@@ -24,7 +24,6 @@ from typing import Any
 
 from rigidsim.scene.arithmetic import GUARD_BITS, negligible
 from rigidsim.scene.expressions.names import PROVIDERS
-from rigidsim.scene.expressions.piecewise import on_sides
 from rigidsim.scene.expressions.tree import (
     Constant,
     Expression,
@@ -36,6 +35,7 @@ from rigidsim.scene.expressions.tree import (
     lines_in,
     names_used,
     nodes,
+    on_sides,
     operations,
     placed,
     rational_value,

@@ -20,12 +20,11 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, MemberError, Problem, Remedy, ensure
 from rigidsim.scene.choices import AUTO, FULL
-from rigidsim.scene.config import Experiment
+from rigidsim.scene.config import Experiment, inline, parse_toml
 from rigidsim.scene.exact import ExactNumber, fraction_of, parse_number
 from rigidsim.scene.paths import Path, leaves
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.schema import INDICATORS, LARGEST_AXIS, AxisTable, SweepTable, config_model
-from rigidsim.scene.toml_text import inline, parse_toml
 from rigidsim.scene.validation_messages import nearest, shown
 
 MOST_MEMBERS = 100_000_000

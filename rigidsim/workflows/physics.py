@@ -25,14 +25,13 @@ from rigidsim.accuracy.modelling import Unmeasured, measure_modelling
 from rigidsim.errors import FORCE, OUT, ConfigError, Problem, Remedy, RunFolderError
 from rigidsim.model.load import loads_of
 from rigidsim.scene.choices import FULL, REDUCED
-from rigidsim.scene.config import Experiment
+from rigidsim.scene.config import Experiment, assignments_of
 from rigidsim.scene.exact import parse_number
 from rigidsim.scene.readable import span_text
 from rigidsim.scene.registry import LOADS, EffectPart, names_of, one_of
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.swept import plain
-from rigidsim.scene.toml_text import assignments_of
 from rigidsim.session.session import Tuning
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.folder import RunFolder

@@ -21,10 +21,9 @@ from rigidsim.errors import FORCE, ConfigError, Remedy, RunFolderError
 from rigidsim.model.load import Load
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.choices import AUTO, FULL
-from rigidsim.scene.config import Experiment, Overrides, parse
+from rigidsim.scene.config import Experiment, Overrides, assignments, assignments_of, parse
 from rigidsim.scene.parts_of_values import in_time_order
 from rigidsim.scene.scene import Scene, build_scene
-from rigidsim.scene.toml_text import assignments, assignments_of
 from rigidsim.session.dataset import refuse_taken_names
 from rigidsim.session.dataset import root_attributes as attributes_now
 from rigidsim.session.execution import execute, with_timeline

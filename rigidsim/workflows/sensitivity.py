@@ -11,7 +11,7 @@ import numpy as np
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.row_rotations import normalised
+from rigidsim.scene.rotations import normalised
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.by_keys import KeyTangents, Rows, parametrised, refuse_without_derivatives, turned
 from rigidsim.solve.compiled import interruptible

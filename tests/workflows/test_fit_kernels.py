@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from support import config
 
 import rigidsim
-from rigidsim.formats.ck_reading import read_rows
+from rigidsim.formats.spice import read_rows
 from rigidsim.scene.epochs import parse_epoch
 
 spiceypy = pytest.importorskip("spiceypy")

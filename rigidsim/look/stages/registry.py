@@ -44,8 +44,7 @@ from rigidsim.look.stages.parts import (
 from rigidsim.look.stages.uncertainty import add_cone
 from rigidsim.look.stages.wheels import add_wheels
 from rigidsim.scene.bodies.presets import KnownBody
-from rigidsim.scene.rotations import quaternion_of
-from rigidsim.scene.row_rotations import multiplied, of_euler
+from rigidsim.scene.rotations import multiplied, of_euler, quaternion_of
 
 _Planet = KnownBody | None
 ENERGY: parts.Color = (120, 150, 200)

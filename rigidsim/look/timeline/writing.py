@@ -40,7 +40,7 @@ from rigidsim.look.timeline.drawn import (
 )  # fmt: skip
 from rigidsim.scene.parts_of_values import in_time_order
 from rigidsim.scene.readable import epoch_of
-from rigidsim.scene.row_rotations import angles_between, normalised
+from rigidsim.scene.rotations import angles_between, normalised
 
 TRAIL_ROWS = 450  # at most in the bright end of a trail, and never more than a tenth of the run
 PIXELS = 800.0  # about the height of the page

@@ -7,9 +7,14 @@ from __future__ import annotations
 
 import math
 import random
+from bisect import bisect_right
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from datetime import date
 from decimal import Decimal
+from fractions import Fraction
+from functools import lru_cache
+from importlib.resources import files
 from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
 import heyoka as hy
@@ -26,8 +31,9 @@ from rigidsim.model.rotations import Symbolic, along
 from rigidsim.model.sources import in_body_axes, read_in
 from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, norm, transpose, unit_vectors
+from rigidsim.scene.bodies.gravity_field import Harmonic
 from rigidsim.scene.bodies.presets import EARTH
-from rigidsim.scene.epochs import Epoch
+from rigidsim.scene.epochs import DIGITS, Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import PLACES, NameProvider, Readable, provides
 from rigidsim.scene.expressions.tree import Constant, Expression, states_read
@@ -46,7 +52,6 @@ from rigidsim.scene.fields import (
     one_of,
     together,
 )
-from rigidsim.scene.geomagnetic_field import MOST, RADIUS, igrf
 from rigidsim.scene.orbits import OrbitFields, resolve_orbit
 from rigidsim.scene.readable import length_text, value_text
 from rigidsim.scene.registry import EffectPart, Setting, degree_parts, register_load
@@ -54,6 +59,51 @@ from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.space_axes import earth_axes, rotation_rate
 from rigidsim.scene.swept import plain
+
+MOST = 13
+"""Its degree."""
+RADIUS = 6371200  # m, to which the coefficients refer
+
+
+def igrf(epoch: Epoch, degree: int) -> dict[Harmonic, Fraction]:
+    """Gauss coefficients at a date, nT, Schmidt semi-normalized: g_nm of cosines and h_nm of sines.
+
+    Between two years of the table they are linear in time, as the IGRF is defined.
+
+    Args:
+        degree: up to which they are given, 1 to ``MOST``.
+
+    Raises:
+        ValueError: a date without coefficients.
+    """
+    years, table = _table()
+    uniform = epoch.uniform()
+    day = uniform.day + Fraction(uniform.ticks, 86400 * 10**DIGITS)
+    begins = [date(year, 1, 1).toordinal() for year in years]
+    if not begins[0] <= day <= begins[-1]:
+        raise ValueError(f"the coefficients of IGRF-14 that are kept here are for {years[0]} to {years[-1]}")
+    at = min(bisect_right(begins, day), len(years) - 1)
+    share = Fraction(day - begins[at - 1], begins[at] - begins[at - 1])
+    return {
+        key: values[at - 1] + share * (values[at] - values[at - 1])
+        for key, values in table.items()
+        if key[0] <= degree
+    }
+
+
+@lru_cache(maxsize=1)
+def _table() -> tuple[list[int], dict[Harmonic, list[Fraction]]]:
+    """Years, and the values of each coefficient in them."""
+    text = (files("rigidsim.scene") / "data" / "igrf14.txt").read_text(encoding="ascii")
+    head, *rows = (line.split() for line in text.splitlines() if not line.startswith("#"))
+    found = {}
+    for n, m, *values in rows:
+        found[int(n), abs(int(m)), int(m) < 0] = [Fraction(x) for x in values]
+    return [int(year) for year in head[2:]], found
+
+
+# --- loads --------------------------------------------------------------------------------------------------
+
 
 FIELD_NAMES = ("bx", "by", "bz")
 CHANGE_NAMES = ("dbx", "dby", "dbz")

@@ -49,7 +49,7 @@ from rigidsim.model.sources import RELATIVE_NAMES, flown_about, read_in
 from rigidsim.model.two_part import rounded
 from rigidsim.scene.arithmetic import Matrix, Vector, cross, norm
 from rigidsim.scene.arithmetic import apply as multiply
-from rigidsim.scene.bodies.outside import OuterSurface, Plate
+from rigidsim.scene.bodies.body import OuterSurface, Plate
 from rigidsim.scene.bodies.presets import EARTH, known_body
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.exact import ExactNumber

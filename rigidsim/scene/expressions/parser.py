@@ -31,7 +31,6 @@ from rigidsim.scene import units
 from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.expressions.names import BODY_NAMES, Readable
-from rigidsim.scene.expressions.piecewise import written_out
 from rigidsim.scene.expressions.tree import (
     FUNCTIONS,
     PIECEWISE,
@@ -46,6 +45,7 @@ from rigidsim.scene.expressions.tree import (
     fold,
     nodes,
     placed,
+    written_out,
 )
 from rigidsim.scene.validation_messages import nearest
 

@@ -18,7 +18,6 @@ import numpy as np
 
 from rigidsim.model.system import System
 from rigidsim.model.two_part import exactly, in_two_numbers
-from rigidsim.scene.expressions.piecewise import on_sides
 from rigidsim.scene.expressions.tree import (
     Expression,
     ExpressionError,
@@ -27,6 +26,7 @@ from rigidsim.scene.expressions.tree import (
     evaluate,
     lines_in,
     names_used,
+    on_sides,
     operations,
 )
 from rigidsim.solve.precision import Precision, Scalar

@@ -21,9 +21,9 @@ import h5py
 import numpy as np
 
 from rigidsim.errors import RESUME, RunFolderError
+from rigidsim.scene.config import apply_overrides, parse_toml
 from rigidsim.scene.schema import RANDOM, AxisTable
 from rigidsim.scene.sweep import Axis, Sweep
-from rigidsim.scene.toml_text import apply_overrides, parse_toml
 from rigidsim.store import atomic
 from rigidsim.store.atomic import sink
 from rigidsim.store.netcdf import NetcdfFile, writing

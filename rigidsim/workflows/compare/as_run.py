@@ -15,7 +15,7 @@ import numpy as np
 import xarray
 
 from rigidsim.errors import RigidsimError
-from rigidsim.formats import ck_reading
+from rigidsim.formats.spice import CK_SUFFIX, read_ck
 from rigidsim.formats.trajectories import Trajectory, is_trajectory, read_trajectory, trajectory_of
 from rigidsim.scene.scene import Scene
 from rigidsim.store.run import Run, SavedRun, ShownRun, open_run
@@ -47,11 +47,11 @@ def trajectory_given(table: Any, scene: Scene, kernels: Sequence[str | Path]) ->
         found = trajectory_of(table)
         return found if hasattr(table, "data_vars") else replace(found, reach=scene.reach).dated()
     path = Path(table)
-    if path.suffix.lower() == ck_reading.SUFFIX or kernels:
+    if path.suffix.lower() == CK_SUFFIX or kernels:
         if scene.epoch is None:
             raise RigidsimError(f"{path}: a CK holds dates; give the date of time 0 as [time] epoch")
         files, zero = [Path(one) for one in kernels], scene.epoch.since_j2000()
-        return ck_reading.read_ck(path, files, zero, *scene.reach)
+        return read_ck(path, files, zero, *scene.reach)
     if path.is_dir() and path.suffix != ".zarr":
         return trajectory_given(open_run(path), scene, kernels)
     return read_trajectory(path, scene.reach).in_axes(scene.axes)

@@ -33,14 +33,14 @@ from rigidsim.formats.digits import FEW, written_resolution
 from rigidsim.formats.trajectories import Trajectory
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import parse_number
-from rigidsim.scene.rotations import quaternion_of
-from rigidsim.scene.row_rotations import (
+from rigidsim.scene.rotations import (
     SEQUENCES,
     angles_between,
     conjugated,
     multiplied,
     normalised,
     of_euler,
+    quaternion_of,
     turned,
     vector_of,
 )

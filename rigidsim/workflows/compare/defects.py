@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidsim.scene.row_rotations import conjugated, multiplied, normalised, turned, vector_of
+from rigidsim.scene.rotations import conjugated, multiplied, normalised, turned, vector_of
 from rigidsim.solve.from_states import FromStates, RowStates
 from rigidsim.workflows.fit.estimation import Linear, iterate
 

@@ -14,7 +14,7 @@ import numpy as np
 import xarray
 
 from rigidsim.accuracy.comparison import parts_of, rotation_vectors
-from rigidsim.scene.row_rotations import angles_between, normalised
+from rigidsim.scene.rotations import angles_between, normalised
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.from_states import FromStates, NotFromStates, RowStates
 from rigidsim.workflows.compare import defects

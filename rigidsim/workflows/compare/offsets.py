@@ -14,7 +14,7 @@ import numpy as np
 
 from rigidsim.errors import RigidsimError, ensure
 from rigidsim.scene.exact import parse_number
-from rigidsim.scene.row_rotations import angles_between, conjugated, multiplied, vector_of
+from rigidsim.scene.rotations import angles_between, conjugated, multiplied, vector_of
 from rigidsim.workflows.compare.conventions import ANGLES, Attitudes, find_convention
 
 FIRST, ESTIMATE = "first", "estimate"

@@ -20,7 +20,7 @@ from pydantic import PrivateAttr
 
 from rigidsim.errors import FORCE, RESUME, SWEEP, ConfigError, Problem, Remedy, RigidsimError, RunFolderError
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.row_rotations import conjugated, multiplied, normalised, turned, vector_of
+from rigidsim.scene.rotations import conjugated, multiplied, normalised, turned, vector_of
 from rigidsim.store import atomic, provenance
 from rigidsim.store.folder import FitFolder
 from rigidsim.store.outputs import refuse_inputs

@@ -19,7 +19,6 @@ from typing import Any, get_args
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem, RigidsimError, ensure
-from rigidsim.formats import ck_reading
 from rigidsim.formats.columns import (
     MRP,
     POSITIONS,
@@ -30,6 +29,7 @@ from rigidsim.formats.columns import (
     quaternions_from,
 )
 from rigidsim.formats.messages import MESSAGE_COLUMNS
+from rigidsim.formats.spice import CK_SUFFIX, read_rows
 from rigidsim.formats.trajectories import Trajectory, config_unit, read_columns
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.names import written
@@ -41,7 +41,7 @@ from rigidsim.scene.expressions.names import names_of
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import ExpressionError, names_used, states_read
 from rigidsim.scene.registry import OBSERVABLES
-from rigidsim.scene.row_rotations import conjugated, multiplied, normalised, of_euler, of_vector, vector_of
+from rigidsim.scene.rotations import conjugated, multiplied, normalised, of_euler, of_vector, vector_of
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.scene.schema import Config, FitDataTable, KnownWithin
 from rigidsim.scene.space_axes import SpaceAxes
@@ -296,7 +296,7 @@ class _Reader:
     def _opened(self) -> Trajectory:
         """The rows of a file; of a CK, which holds dates, and attitudes relative to J2000, as it has them."""
         file, *kernels = self.files
-        if not kernels and file.suffix.lower() != ck_reading.SUFFIX:
+        if not kernels and file.suffix.lower() != CK_SUFFIX:
             what = f"{self.table.file} is one of several files, of which a fit copies one; write one table"
             ensure(file.suffix != ".42", self._fault("file", what))
             saved = file / "dataset.h5"  # where the file is the folder of a run
@@ -315,7 +315,7 @@ class _Reader:
             if path.is_file() and path.read_bytes().startswith(_META):
                 what = "is a meta-kernel, whose paths a fit's copies don't have; list its kernels"
                 raise self._fault("file", f"{given} {what}")
-        return ck_reading.read_rows(file, kernels, self.scene.epoch, self.scene.axes)
+        return read_rows(file, kernels, self.scene.epoch, self.scene.axes)
 
     def _size(self, key: str, unit: str, expected: str | None) -> float:
         """A unit in another one, or in SI where the dimension isn't known."""
