@@ -1,4 +1,5 @@
-"""CCSDS messages in KVN syntax, version 2.0: attitudes (AEM and APM, 504.0-B-2) and orbits (OEM, 502.0-B).
+"""CCSDS messages in KVN syntax, version 2.0: attitudes (AEM and APM, 504.0-B-2) and orbits (OEM, 502.0-B);
+the AEM also in version 1.0.
 
 Section 6 of 504.0-B-2, with which 502.0-B agrees: lines of at most 254 printable ASCII characters; numbers of
 at most 16 digits, so that a double is rounded to a few parts in 1e16; no nan, infinity or negative zero; text
@@ -89,7 +90,9 @@ def labels(naming: Naming, attributes: Mapping[str, Any]) -> Labels:
 
 # --- what is asked of an attitude message -------------------------------------------------------------------
 
-_TYPES = ("quaternion", "quaternion/derivative", "quaternion/angvel", "euler_angle", "euler_angle/angvel")
+_TYPES = (
+    "quaternion", "quaternion/derivative", "quaternion/angvel", "euler_angle", "euler_angle/angvel", "spin"
+)  # fmt: skip
 _FROM = ("space", "body")
 _BODY = "SC_BODY_1"
 
@@ -104,6 +107,7 @@ class _Asked:
         time: scale of its dates; empty for the epoch's.
         segment: intervals, or seconds, of a segment; None for a single one.
         at: time of the scene, s, of an APM; None for the last sample.
+        version: of an AEM, "1" or "2".
     """
 
     type: str = "quaternion"
@@ -112,6 +116,7 @@ class _Asked:
     time: str = ""
     segment: int | float | None = None
     at: float | None = None
+    version: str = "2"
 
     @classmethod
     def of(cls, naming: Naming, kind: str) -> "_Asked":
@@ -119,6 +124,7 @@ class _Asked:
         given = {key.strip(): str(value).strip() for key, value in naming.message.items()}
         last = "segment" if kind == "AEM" else "at"
         choices = {"type": _TYPES, "from": _FROM, "time": SCALES, "sequence": SEQUENCES, last: ()}
+        choices |= {"version": ("1", "2")} if kind == "AEM" else {}
         for key, text in given.items():
             near = nearest(key, list(choices))
             what = f"--message: given {shown(key)}{near}; allowed: {', '.join(choices)}"
@@ -139,12 +145,20 @@ class _Asked:
                 what = f'--message {last}: given {shown(text)}; a time with its unit, such as "10 min", '
                 more = "or a number of rows " if last == "segment" else ""
                 raise RigidsimError(f"{what}{more}is allowed") from None
-        return cls(**found)
+        asked = cls(**found)
+        what = "--message from: given body; a spin leads from space: leave it out"
+        ensure(not (asked.type == "spin" and asked.source == "body"), RigidsimError(what))
+        return asked
 
     @property
     def rates(self) -> bool:
         """Whether rates are written."""
-        return "/" in self.type
+        return "/" in self.type or self.type == "spin"
+
+    @property
+    def old(self) -> bool:
+        """Whether by version 1."""
+        return self.version == "1"
 
 
 class _Attitude:
@@ -175,10 +189,14 @@ class _Attitude:
             quaternion, turning = ([q[0], *(-x for x in q[1:])] if q else q for q in (quaternion, turning))
             rates = [-w for w in rates]
         found = [*quaternion[1:], quaternion[0]]
-        if self.asked.type.startswith("euler"):
+        spin = self.asked.type == "spin"
+        if spin or self.asked.type.startswith("euler"):
             q = unit_quaternion(self._context, [self._context.mpf(str(x)) for x in quaternion])
-            angles = euler_from_matrix(self._context, rotation_matrix(q), self.asked.sequence)
+            sequence = "zxz" if spin else self.asked.sequence
+            angles = euler_from_matrix(self._context, rotation_matrix(q), sequence)
             found = [Decimal(mpmath.nstr(self._context.degrees(x), 25)) for x in angles]
+        if spin:  # turns by alpha + 90 deg, 90 deg - delta and the spin angle
+            return [found[0] - 90, 90 - found[1], found[2]], [rates[2] * self._degrees]
         if self.asked.type.endswith("derivative"):
             return found, [*turning[1:], turning[0]]
         return found, [w * self._degrees for w in rates]
@@ -189,9 +207,16 @@ def write_aem(table: Table, path: Path, source: TableSource) -> None:
     rows = _Attitude("AEM", table, source)
     asked = rows.asked
     keys = dict(zip(("REF_FRAME_A", "REF_FRAME_B"), rows.frames, strict=True))
-    opening = f"ATTITUDE_TYPE = {asked.type.upper()}\n"
-    opening += f"EULER_ROT_SEQ = {asked.sequence.upper()}\n" * asked.type.startswith("euler")
-    opening += f"ANGVEL_FRAME = {_BODY}\n" * asked.type.endswith("angvel") + "META_STOP\n\nDATA_START\n"
+    kind, sequence = asked.type.upper(), asked.sequence.upper()
+    if asked.old:
+        kind, sequence = kind.replace("ANGVEL", "RATE"), sequence.translate(str.maketrans("XYZ", "123"))
+    opening = "ATTITUDE_DIR = A2B\n" * asked.old + f"ATTITUDE_TYPE = {kind}\n"
+    opening += "QUATERNION_TYPE = LAST\n" * (asked.old and kind.startswith("QUATERNION"))
+    opening += f"EULER_ROT_SEQ = {sequence}\n" * kind.startswith("EULER")
+    if asked.type.endswith("angvel"):
+        along = f"REF_FRAME_{'B' if asked.source == 'space' else 'A'}"
+        opening += f"RATE_FRAME = {along}\n" if asked.old else f"ANGVEL_FRAME = {_BODY}\n"
+    opening += "META_STOP\n\nDATA_START\n"
 
     def row(state: list[Decimal]) -> list[Decimal]:
         return [x for part in rows.parts(state) for x in part]
@@ -217,18 +242,22 @@ def write_apm(table: Table, path: Path, source: TableSource) -> None:
     seconds, *state = (decimals(parts, source.bits)[0] for parts in values)
     with localcontext(_WIDE):
         attitude, rates = rows.parts(state)
-    quaternion = asked.type.startswith("quaternion")
-    names = ["Q1", "Q2", "Q3", "QC"] if quaternion else ["ANGLE_1", "ANGLE_2", "ANGLE_3"]
+    block, names = "QUAT", ["Q1", "Q2", "Q3", "QC"]
+    if asked.type == "spin":
+        block, names = "SPIN", ["SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", "SPIN_ANGLE_VEL"]
+        attitude, rates = [*attitude, *rates], []
+    elif asked.type.startswith("euler"):
+        block, names = "EULER", ["ANGLE_1", "ANGLE_2", "ANGLE_3"]
     frames = [f"REF_FRAME_{x} = {name}" for x, name in zip("AB", rows.frames, strict=True)]
     own = rates if asked.type.endswith("derivative") else []
     lines = [
         *_head("APM", source, named, {}, asked),
         f"EPOCH = {_tag(named.epoch, seconds, asked.time)}", "",
-        f"{'QUAT' if quaternion else 'EULER'}_START", *frames,
-        *([] if quaternion else [f"EULER_ROT_SEQ = {asked.sequence.upper()}"]),
+        f"{block}_START", *frames,
+        *([f"EULER_ROT_SEQ = {asked.sequence.upper()}"] if block == "EULER" else []),
         *(f"{name} = {_number(x)}" for name, x in zip(names, attitude, strict=True)),
         *(f"{name}_DOT = {_number(x)}" for name, x in zip(names, own, strict=False)),
-        f"{'QUAT' if quaternion else 'EULER'}_STOP",
+        f"{block}_STOP",
     ]  # fmt: skip
     if asked.type.endswith("angvel"):
         components = (f"ANGVEL_{x} = {_number(w)}" for x, w in zip("XYZ", rates, strict=True))
@@ -283,7 +312,7 @@ def _head(
     ]
     plain = ("".join(c if " " <= c <= "~" else "?" for c in note) for note in notes)
     return [
-        f"CCSDS_{message}_VERS = 2.0",
+        f"CCSDS_{message}_VERS = {asked.version}.0",
         *(f"COMMENT {note[: _LONGEST_LINE - 8]}" for note in plain),
         f"CREATION_DATE = {datetime.now(UTC).strftime('%Y-%m-%dT%H:%M:%S')}",
         "ORIGINATOR = RIGIDSIM",

@@ -550,7 +550,27 @@ class _AttitudeRows:
         return attitude, rates * (2 / _RADIAN) if self.dots else rates
 
 
-def message_columns(path: Path, kind: str, text: str | None = None) -> dict[str, Any]:
+def _chosen(segments: list[_Segment], path: Path, chosen: str) -> list[_Segment]:
+    """The segment of a number from 1, or the first that reaches a date."""
+    count = f"{len(segments)} segment{'s' * (len(segments) > 1)}"
+    if chosen.isdigit():
+        what = f"{path}: given segment {chosen} of a message with {count}; 1 to {len(segments)} is allowed"
+        ensure(1 <= int(chosen) <= len(segments), RigidsimError(what))
+        return [segments[int(chosen) - 1]]
+    ends = [(one.epochs()[0], one.epochs()[-1]) for one in segments]
+    try:
+        date = parse_epoch(chosen, ends[0][0].scale)
+    except ValueError as error:
+        what = f"{path}: given the segment {chosen!r}; a number from 1 is allowed, or a date within a segment"
+        raise RigidsimError(f"{what} ({error})") from None
+    for one, (begin, end) in zip(segments, ends, strict=True):
+        if begin.since(date) <= 0 <= end.since(date):
+            return [one]
+    spans = ", ".join(f"{begin} to {end}" for begin, end in ends[:8])
+    raise RigidsimError(f"{path}: given the segment of {date}, which is in none; its {count}: {spans}")
+
+
+def message_columns(path: Path, kind: str, text: str | None = None, segment: str = "") -> dict[str, Any]:
     """A message as what ``Trajectory`` is made of.
 
     Attitudes are unit quaternions from body to space axes, rates along body axes in deg/s, positions in m.
@@ -558,6 +578,7 @@ def message_columns(path: Path, kind: str, text: str | None = None) -> dict[str,
     Args:
         kind: "AEM", "APM" or "OEM".
         text: the message, if it was read already.
+        segment: number from 1 of the only one that counts, or a date within it.
 
     Raises:
         RigidsimError: something can't be read, with its line and what to do.
@@ -565,6 +586,7 @@ def message_columns(path: Path, kind: str, text: str | None = None) -> dict[str,
     if text is None:
         text = path.read_text(encoding="utf-8-sig", errors="replace")
     segments = _segments(path, kind, text)
+    segments = _chosen(segments, path, segment) if segment else segments
     epochs = [one.epochs() for one in segments]
     reading: Any = _OrbitRows if kind == "OEM" else _AttitudeRows
     parts = [reading(*each) for each in zip(segments, epochs, strict=True)]

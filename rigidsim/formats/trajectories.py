@@ -265,16 +265,25 @@ def is_trajectory(path: Path) -> bool:
     return suffix in {*TEXT, ".npz", ".42", ".parquet", ".pq", ".aem", ".apm", ".oem", ".xml", ".bin"}
 
 
+def file_and_segment(path: Path) -> tuple[Path, str]:
+    """A file, and the segment of a message that its name ends with: ``top.aem#2``."""
+    name, _, segment = path.name.rpartition("#")
+    return (path.with_name(name), segment) if name and not path.exists() else (path, "")
+
+
 def read_columns(path: Path) -> Trajectory:
     """Read a file by the kind that its name and its first line say.
 
     Raises:
         RigidsimError: there is no such file, it is of no known kind, or it can't be read.
     """
+    path, segment = file_and_segment(path)
     if not path.exists():
         raise RigidsimError(f"{path}: there is no such file; allowed: {KINDS}")
     suffix = path.suffix.lower()
+    what = f"{path}: given segment {segment}, which an AEM or OEM alone has; remove it"
     if suffix in (*_XARRAY, ".parquet", ".pq", ".npz"):
+        ensure(not segment, RigidsimError(what))
         try:
             return {".parquet": _of_parquet, ".pq": _of_parquet, ".npz": _of_numpy}.get(
                 suffix, _of_xarray_file
@@ -288,7 +297,8 @@ def read_columns(path: Path) -> Trajectory:
             with path.open(errors="replace") as file:
                 head = file.read(4096)
             if (found := re.search(r"CCSDS_(AEM|APM|OEM)_VERS", head)) is not None:
-                return Trajectory(source=str(path), **message_columns(path, found[1]))
+                return Trajectory(source=str(path), **message_columns(path, found[1], segment=segment))
+            ensure(not segment, RigidsimError(what))
             if suffix == ".42":
                 return _of_42(path)
             if suffix == ".bin" or gubas.is_table(path):

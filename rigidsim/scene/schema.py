@@ -544,6 +544,8 @@ class FitDataTable(ConfigTable):
     """
     kernels: EachOnce[StrictStr] = Field(default_factory=list, examples=[["clock.tsc", "leapseconds.tls"]])
     """of a CK: the clock (SCLK) and other kernels that SPICE needs; paths from the config's folder"""
+    segment: StrictStr | None = Field(None, examples=["2", "2024-03-01T00:10:00"])
+    """of an AEM or OEM: number from 1 of the only segment that counts, or a date within it"""
     time: StrictStr = Field("time", examples=["time", "utc"])
     """column of the times: seconds of the run, dates, or Unix time"""
     observable: StrictStr = Field(examples=["quaternion", "angular_velocity", "wz^2"])
@@ -802,7 +804,10 @@ class Config(ConfigTable):
                     changes["time"] = self.time.model_copy(update={"epoch": begun})
             except (RigidsimError, ValueError) as error:
                 raise refuse(f"[initial] apm: {error}") from None
-            if self.frame.axes is None and self.ephemeris is None:
+            if stated.axes in LOCAL_FRAMES:
+                local = {"relative_to": start.relative_to or stated.axes}
+                changes["initial"] = start.model_copy(update=local)
+            elif self.frame.axes is None and self.ephemeris is None:
                 changes["frame"] = self.frame.model_copy(update={"axes": stated.axes})
         if (start.tle or start.frame) and self.frame.axes is None and self.ephemeris is None:
             changes["frame"] = self.frame.model_copy(update={"axes": "GCRF"})

@@ -22,7 +22,7 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from decimal import Decimal
 from fractions import Fraction
@@ -72,7 +72,7 @@ _BESIDE = {"node_longitude": ("obliquity",), "prime_meridian": ("pole", "obliqui
 """Keys that give nothing alone, and what each counts with."""
 _BESIDE_FOUND = dict.fromkeys(("relative", DOUBLY), ATTITUDES[:-1])
 """What may be given with an equilibrium; a Cassini state takes a period."""
-_IN_SPACE = ("pole", "obliquity", "apm", "angular_momentum", "equilibrium")
+_IN_SPACE = ("pole", "obliquity", "angular_momentum", "equilibrium")
 """Keys that count in space, whatever turns."""
 STARTS: dict[str, Callable[[Any], InitialRotation]] = {}
 """Starts that rooms above find, by names of equilibria and keys: from the scene so far; ConfigError."""
@@ -127,7 +127,8 @@ def attitude_of(scene: Any) -> InitialRotation:
     given = given_attitude(scene)
     if scene.config.initial.relative_to is None:
         return given
-    return STARTS["relative attitude"](scene.started(given))
+    turned = STARTS["relative attitude"](scene.started(given))
+    return replace(turned, angular_velocity=given.angular_velocity)
 
 
 def given_attitude(scene: Setting) -> InitialRotation:

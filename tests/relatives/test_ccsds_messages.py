@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from support import seeds
+from support import seeds, unoptimised_code
 
 import rigidsim
 from rigidsim.formats.registry import Naming
@@ -220,6 +220,13 @@ class Aem:
         assert found.settled
         for date, moment in zip(found.epochs, self.dates, strict=True):
             assert date == parse_epoch(f"{moment.isoformat()} {self.scale}")
+        number = int(self.rng.integers(self.segments))
+        rows = np.split(np.arange(len(self.times)), self.segments)[number]
+        inside = self.dates[int(self.rng.choice(rows))].isoformat()
+        one = read_trajectory(path.with_name(f"{path.name}#{self.rng.choice([str(number + 1), inside])}"))
+        assert np.array_equal([float(date.since(found.epochs[0])) for date in one.epochs],
+                              [float(found.epochs[n].since(found.epochs[0])) for n in rows])  # fmt: skip
+        assert all(np.array_equal(one.columns[x], columns[x][rows]) for x in ("qw", "qx", "qy", "qz"))
         if self.kind in ("QUATERNION", "EULER_ANGLE"):
             assert "wx" not in columns
             return
@@ -583,6 +590,54 @@ def test_parameter_messages_are_starts_and_data(seed: int, tmp_path: Path) -> No
     assert shown.attrs["epoch"] == str(parse_epoch(f"{given.dates[0].isoformat()} {given.scale}"))
 
 
+ORBIT = """
+[[loads]]
+kind = "gravity_gradient"
+gravitational_parameter = 3.986004418e14
+satellite_orbit = {semi_major_axis = 7e6, inclination = 0.9}
+"""
+
+
+@pytest.mark.parametrize("seed", seeds(2, 30))
+def test_a_message_against_a_local_frame_is_a_start(seed: int, tmp_path: Path) -> None:
+    """On a circle, at the node: axes and rate of the frame in closed form; all types and directions."""
+    rng = np.random.default_rng(seed)
+    given = Aem(rng)
+    while given.version == 1 and len(set(given.sequence)) < 3:
+        given = Aem(rng)
+    space = next(one for one in given.frames if one in SPACE)
+    named = str(rng.choice(["LVLH", "LVLH_ROTATING", "RSW_ROTATING", "RTN", "VVLH", "rsw rotating"]))
+    (tmp_path / "top.apm").write_text(apm(given).replace(space, named))
+    up, ahead, normal = np.eye(3)[0], np.array([0, np.cos(0.9), np.sin(0.9)]), [0, -np.sin(0.9), np.cos(0.9)]
+    columns = [ahead, -np.array(normal), -up] if "V" in named else [up, ahead, np.array(normal)]
+    known = Rotation.from_matrix(np.stack(columns, axis=1)) * given.top.attitude(given.times[:1])[0]
+    rated = given.kind not in ("QUATERNION", "EULER_ANGLE")
+    rates = given.top.rates(given.times[:1])[0] if rated else np.zeros(3)
+    rates += known.inv().apply(np.sqrt(3.986004418e14 / 7e6**3) * np.array(normal))
+    text = 'name = "top"\n[body]\nprincipal_moments = [1, 1, 1.4]\n[initial]\napm = "top.apm"\n'
+    text += ("" if rated else "angular_velocity = [0, 0, 0]\n") + "[time]\nend = 1\nsamples = 2\n"
+    (tmp_path / "top.toml").write_text(f"{text}[output]\ntimeline = false\nestimate = false\n{ORBIT}")
+    shown = rigidsim.run(rigidsim.load(tmp_path / "top.toml"), out=None).dataset
+    read = Rotation.from_quat(np.roll(shown.quaternion.values[0], -1))
+    assert (read.inv() * known).magnitude() < 1e-7
+    close = 1e-8 if "DERIVATIVE" in given.kind or "SPIN" in given.kind else 1e-12
+    assert np.abs(shown.angular_velocity.values[0] - rates).max() < close
+    fit = (
+        '[fit]\nparameters = ["initial.attitude"]\n[[fit.data]]\nfile = "it.csv"\nobservable = "quaternion"\n'
+    )
+    rows = np.column_stack([shown.time, shown.quaternion])
+    np.savetxt(tmp_path / "it.csv", rows, "%.17g", ",", header="time,qw,qx,qy,qz", comments="")
+    (tmp_path / "top.toml").write_text((tmp_path / "top.toml").read_text() + f"{fit}sigma = 1e-6\n")
+    with unoptimised_code():
+        found = rigidsim.fit(rigidsim.load(tmp_path / "top.toml"))
+    assert np.abs([one.value for one in found.parameters]).max() < 1e-8
+    ours = "rsw" if "V" in named else "lvlh"
+    other = (tmp_path / "top.toml").read_text().replace("apm =", f'relative_to = "{ours}"\napm =')
+    (tmp_path / "top.toml").write_text(other)
+    with pytest.raises(rigidsim.ConfigError, match=f'relative_to: given "{ours}", but top.apm is against'):
+        rigidsim.run(rigidsim.load(tmp_path / "top.toml"), out=None)
+
+
 def test_a_fit_begins_at_a_message(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
     given, late = Aem(rng, "QUATERNION/ANGVEL"), Rotation.from_rotvec([1e-3, -2e-3, 1e-3])
@@ -655,10 +710,13 @@ def test_messages_of_all_types_are_written(seed: int, tmp_path: Path) -> None:
         epoch=f"2024-03-01T00:00:00.25 {scale}", end=6.0,
     ).replace("samples = 2", "samples = 13")  # fmt: skip
     run = rigidsim.run(rigidsim.parse(scene), out=tmp_path)
-    kind = str(rng.choice(["quaternion", "quaternion/derivative", "quaternion/angvel", "euler_angle/angvel"]))
+    kinds = ["quaternion", "quaternion/derivative", "quaternion/angvel", "euler_angle/angvel", "spin"]
+    kind, old = str(rng.choice(kinds)), bool(rng.integers(2))
     sequence, source = str(rng.choice(SEQUENCES)).lower(), str(rng.choice(["space", "body"]))
+    source = "space" if kind == "spin" else source
     options = {"type": kind, "sequence": sequence, "from": source, "time": str(clock)}
-    naming = {n: Naming(message=options | m) for n, m in {"aem": {"segment": "2 s"}, "apm": {}}.items()}
+    own = {"aem": {"segment": "2 s", "version": "1" if old else "2"}, "apm": {}}
+    naming = {n: Naming(message=options | m) for n, m in own.items()}
     [aem] = rigidsim.export(run, "aem", tmp_path / "top.aem", naming=naming["aem"])
     [one] = rigidsim.export(run, "apm", tmp_path / "top.apm", naming=naming["apm"])
     dataset = run.dataset
@@ -669,6 +727,18 @@ def test_messages_of_all_types_are_written(seed: int, tmp_path: Path) -> None:
     )  # fmt: skip
     text = aem.read_text()
     assert text.count("META_START") == 3
+    said = dict(line.split(" = ") for line in text.splitlines() if " = " in line)
+    assert said["CCSDS_AEM_VERS"] == ("1.0" if old else "2.0")
+    assert (said.get("ATTITUDE_DIR"), said.get("QUATERNION_TYPE")) == (
+        ("A2B" if old else None, "LAST" if old and kind.startswith("q") else None)
+    )
+    assert said["ATTITUDE_TYPE"] == kind.upper().replace("ANGVEL", "RATE" if old else "ANGVEL")
+    if kind.startswith("euler"):
+        numbered = sequence.translate(str.maketrans("xyz", "123"))
+        assert said["EULER_ROT_SEQ"] == (numbered if old else sequence.upper())
+    if kind.endswith("angvel"):
+        along = said[said["RATE_FRAME"]] if old else said["ANGVEL_FRAME"]
+        assert along == "SC_BODY_1"
     rows = {
         line.split()[0]: [float(x) for x in line.split()[1:]]
         for line in text.splitlines()
@@ -681,6 +751,9 @@ def test_messages_of_all_types_are_written(seed: int, tmp_path: Path) -> None:
         numbers = np.array(row)
         if kind.startswith("euler"):
             written = Rotation.from_euler(sequence.upper(), numbers[:3], degrees=True)
+        elif kind == "spin":
+            written = Rotation.from_euler("ZXZ", numbers[:3] * [1, -1, 1] + [90, 90, 0], degrees=True)
+            assert np.radians(numbers[3]) == pytest.approx(rates[n][2], abs=1e-15)
         else:
             written = Rotation.from_quat(numbers[:4])
         assert (written.inv() * lead[n]).magnitude() < 1e-14
@@ -693,6 +766,8 @@ def test_messages_of_all_types_are_written(seed: int, tmp_path: Path) -> None:
             assert np.abs(numbers[4:] - change).max() < 1e-15
     keys = dict(line.split(" = ") for line in one.read_text().splitlines() if " = " in line)
     names = ["ANGLE_1", "ANGLE_2", "ANGLE_3"] if kind.startswith("euler") else ["Q1", "Q2", "Q3", "QC"]
+    if kind == "spin":
+        names = ["SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", "SPIN_ANGLE_VEL"]
     assert [float(keys[name]) for name in names] == numbers[: len(names)].tolist()
     assert keys["EPOCH"] == date
     ends = [keys["REF_FRAME_A"], keys["REF_FRAME_B"]]
@@ -708,6 +783,40 @@ def test_what_cannot_be_read_is_refused_with_its_line(name: str, tmp_path: Path)
     path.write_text(change(PLAIN))
     with pytest.raises(rigidsim.RigidsimError, match=message):
         read_trajectory(path)
+
+
+def test_one_segment_of_a_message_is_compared_fitted_and_shown(tmp_path: Path) -> None:
+    """Of two segments, the second belongs to another motion."""
+    path = tmp_path / "top.aem"
+    given = Aem(np.random.default_rng(4), "QUATERNION")
+    given.xml, given.segments, given.scale, given.version = False, 1, "TAI", 2
+    given.frames, given.from_space = ["EME2000", "SC_BODY_1"], True
+    given.times = np.linspace(0, 6, 13)
+    given.dates = [datetime(2024, 3, 1) + timedelta(seconds=float(t)) for t in given.times]
+    top = given.top
+    top.spin = top.nutation * np.cos(top.tilt) * (1 / 1.4 - 1)
+    x, y, z, w = top.attitude(np.zeros(1)).as_quat()[0].tolist()
+    scene = SCENE.format(c=1.4, q=[w, x, y, z], w=top.rates(np.zeros(1))[0].tolist(), axes="EME2000",
+                         epoch="2024-03-01T00:00:00 TAI", end=7.0)  # fmt: skip
+    other = given.text()[given.text().index("META_START") :].replace("2024-03-01", "2024-03-02")
+    path.write_text(given.text().replace("-061T", "-03-01T") + other.replace("-061T", "-062T"))
+    fit = '[fit]\nparameters = ["initial.attitude"]\n[[fit.data]]\nfile = "top.aem"\nsegment = "1"\n'
+    (tmp_path / "top.toml").write_text(scene + fit + 'observable = "quaternion"\nsigma = 1e-6\n')
+    with unoptimised_code():
+        found = rigidsim.compare(rigidsim.parse(scene), f"{path}#1")
+        [data] = rigidsim.fit(rigidsim.load(tmp_path / "top.toml"), out=tmp_path / "fits").data
+    assert found.attitude_error.largest < 1e-9
+    assert (data.rows, data.rms < 1e-9) == (13, True)
+    assert open_any(f"{path}#2024-03-01T00:00:01").dataset.sizes["time"] == 13
+    for name, message in {
+        "top.aem#3": "given segment 3 of a message with 2 segments; 1 to 2 is allowed",
+        "top.aem#2024-03-01T01:00:00": "which is in none; its 2 segments: 2024-03-01T00:00:00",
+        "top.aem#last": "given the segment 'last'; a number from 1 is allowed, or a date",
+        "it.csv#2": "given segment 2, which an AEM or OEM alone has; remove it",
+    }.items():
+        (tmp_path / "it.csv").write_text("t,qw,qx,qy,qz\n0,1,0,0,0\n1,1,0,0,0\n")
+        with pytest.raises(rigidsim.RigidsimError, match=message):
+            rigidsim.compare(rigidsim.parse(scene), tmp_path / name)
 
 
 def test_a_row_that_ends_a_segment_and_begins_the_next_counts_once(tmp_path: Path) -> None:

@@ -16,7 +16,13 @@ import xarray
 
 from rigidsim.errors import RigidsimError
 from rigidsim.formats.spice import CK_SUFFIX, read_ck
-from rigidsim.formats.trajectories import Trajectory, is_trajectory, read_trajectory, trajectory_of
+from rigidsim.formats.trajectories import (
+    Trajectory,
+    file_and_segment,
+    is_trajectory,
+    read_trajectory,
+    trajectory_of,
+)
 from rigidsim.scene.scene import Scene
 from rigidsim.store.run import Run, SavedRun, ShownRun, open_run
 from rigidsim.store.summary import Brief
@@ -60,7 +66,7 @@ def trajectory_given(table: Any, scene: Scene, kernels: Sequence[str | Path]) ->
 def files_of(table: Any, kernels: Sequence[str | Path] = ()) -> list[Path]:
     """The files that ``trajectory_given`` reads."""
     read = table.files if isinstance(table, Run) else [table] if isinstance(table, str | Path) else []
-    return [Path(path) for path in (*read, *kernels)]
+    return [file_and_segment(Path(path))[0] for path in (*read, *kernels)]
 
 
 def open_any(path: str | Path) -> SavedRun | ShownRun:
@@ -70,10 +76,10 @@ def open_any(path: str | Path) -> SavedRun | ShownRun:
         RunFolderError: neither, or a damaged run.
         RigidsimError: the file can't be used, or its convention can't be found.
     """
-    given_path = Path(path)
+    given_path, _ = file_and_segment(Path(path))
     if not is_trajectory(given_path) or not given_path.exists():
-        return open_run(given_path)
-    trajectory = read_trajectory(given_path)
+        return open_run(Path(path))
+    trajectory = read_trajectory(Path(path))
     epoch = trajectory.epochs[0] if trajectory.epochs else None
     given = attitudes_of(trajectory, epoch)
     notes = list(given.notes)

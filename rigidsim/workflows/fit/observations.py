@@ -300,7 +300,8 @@ class _Reader:
             what = f"{self.table.file} is one of several files, of which a fit copies one; write one table"
             ensure(file.suffix != ".42", self._fault("file", what))
             saved = file / "dataset.h5"  # where the file is the folder of a run
-            found = read_columns(saved if saved.is_file() else file)
+            given = Path(f"{file}#{self.table.segment}") if self.table.segment else file
+            found = read_columns(saved if saved.is_file() else given)
             return replace(found, reach=self.scene.reach).in_axes(self.scene.axes)
         if self.scene.epoch is None:
             what = "is a CK, which holds dates; give the date of time 0 as [time] epoch"
@@ -579,20 +580,20 @@ class FitKeys:
 
     def _start(self, turn: np.ndarray) -> list[str]:
         """The attitude at the start turned by a rotation vector, instead of whatever gives it."""
-        initial = self.scene.config.initial
-        given = np.array([float(x) for x in given_attitude(self.scene).quaternion])
+        initial, begun = self.scene.config.initial, given_attitude(self.scene)
+        given = np.array([float(x) for x in begun.quaternion])
         quaternion = multiplied(given[None, :], of_vector(turn[None, :]))[0]
         texts = [f"initial.{name}=" for name in _ATTITUDES if getattr(initial, name) is not None]
         along = []
         if initial.spin_period is not None:
             texts.append("initial.spin_period=")
             along = [spin_rate(self.scene) * x for x in self.scene.figure.pole]
-        elif (
-            initial.apm is not None and initial.angular_velocity is None and initial.angular_momentum is None
-        ):
-            along = self.scene.angular_velocity
+        elif initial.apm is not None and begun.angular_velocity is not None:
+            along = begun.angular_velocity
         if initial.apm is not None:  # which implies them
-            texts += [f'time.epoch="{self.scene.epoch}"', f'frame.axes="{self.scene.axes}"']
+            implied = {"time.epoch": self.scene.epoch, "frame.axes": self.scene.axes}
+            implied["initial.relative_to"] = initial.relative_to
+            texts += [f'{key}="{value}"' for key, value in implied.items() if value is not None]
         if along:
             texts.append(f"initial.angular_velocity=[{', '.join(repr(float(w)) for w in along)}]")
         shown_values = ", ".join(repr(float(x)) for x in quaternion)
