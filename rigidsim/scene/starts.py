@@ -22,7 +22,7 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import date
 from decimal import Decimal
 from fractions import Fraction
@@ -127,8 +127,7 @@ def attitude_of(scene: Any) -> InitialRotation:
     given = given_attitude(scene)
     if scene.config.initial.relative_to is None:
         return given
-    turned = STARTS["relative attitude"](scene.started(given))
-    return replace(turned, angular_velocity=given.angular_velocity)
+    return STARTS["relative attitude"](scene.started(given))
 
 
 def given_attitude(scene: Setting) -> InitialRotation:
@@ -156,7 +155,10 @@ def rotation_of(scene: Any) -> InitialRotation:
         key, start = "equilibrium", InitialRotation(scene.quaternion, scene.angular_velocity)
     else:
         key = next(iter(_given(table, RATES)), "apm")
-        rates = vector(scene.context, table.angular_velocity) if key != "apm" else scene.angular_velocity
+        own = key == "apm"
+        rates = (
+            given_attitude(scene).angular_velocity if own else vector(scene.context, table.angular_velocity)
+        )
         if key == "angular_momentum":
             rates = from_momentum(scene)
         elif key == "spin_period":

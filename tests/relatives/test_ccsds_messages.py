@@ -785,7 +785,7 @@ def test_what_cannot_be_read_is_refused_with_its_line(name: str, tmp_path: Path)
         read_trajectory(path)
 
 
-def test_one_segment_of_a_message_is_compared_fitted_and_shown(tmp_path: Path) -> None:
+def test_one_segment_of_a_message_is_fitted_and_shown(tmp_path: Path) -> None:
     """Of two segments, the second belongs to another motion."""
     path = tmp_path / "top.aem"
     given = Aem(np.random.default_rng(4), "QUATERNION")
@@ -803,9 +803,7 @@ def test_one_segment_of_a_message_is_compared_fitted_and_shown(tmp_path: Path) -
     fit = '[fit]\nparameters = ["initial.attitude"]\n[[fit.data]]\nfile = "top.aem"\nsegment = "1"\n'
     (tmp_path / "top.toml").write_text(scene + fit + 'observable = "quaternion"\nsigma = 1e-6\n')
     with unoptimised_code():
-        found = rigidsim.compare(rigidsim.parse(scene), f"{path}#1")
         [data] = rigidsim.fit(rigidsim.load(tmp_path / "top.toml"), out=tmp_path / "fits").data
-    assert found.attitude_error.largest < 1e-9
     assert (data.rows, data.rms < 1e-9) == (13, True)
     assert open_any(f"{path}#2024-03-01T00:00:01").dataset.sizes["time"] == 13
     for name, message in {
