@@ -372,7 +372,7 @@ def swings(dataset: xarray.Dataset) -> tuple[Array, dict[str, Any]]:
     """Libration angles (rows, 2), rad, less half turns so that they swing about zero, and their names."""
     table = need(signals.values(dataset, "libration", 2))
     halves = np.round(np.nanmean(table, axis=0) / np.pi)
-    names = zip(("in the orbit's plane", "out of it"), halves, strict=True)
+    names = zip(("libration in plane", "out of plane"), halves, strict=True)
     labels = [name + (f" − {180 * k:.0f}°" if k else "") for name, k in names]
     return table - np.pi * halves, {"labels": labels}
 

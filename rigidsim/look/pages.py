@@ -24,7 +24,7 @@ _REGULAR = 0.05  # by which swings may differ that have one period
 _FROM_TO = {
     "obliquity_of_date": "obliquity", "climatic": "{}", "insolation": "insolation",
     "tilt": "tilt", "wobble": "nutation angle", "pointing": "pointing error", "roll_pitch_yaw": "{}",
-    "libration": "libration {}", "yaw": "yaw", "separation": "distance",
+    "libration": "{}", "yaw": "yaw", "separation": "distance",
     "rotor_tilts": "axis of rotor {} off L",
     "rotor_rates": "rate of rotor {}", "braking": "remaining {}", "core_axis": "core axis from the mantle's",
 }  # fmt: skip
@@ -147,7 +147,7 @@ def _periods(rows: xarray.Dataset) -> list[tuple[str, str]]:
             found += [("between flips", period_text(float(flips.mean()), rows.attrs))] if len(flips) else []
     elif (turns := signals.values(rows, "quaternion", 4)) is not None:
         angle = 2 * np.arccos(min(abs(float(turns[0] @ turns[-1])), 1.0))
-        found.append(("turned between start and end by", angle_text(angle)))
+        found.append(("turned, start to end", angle_text(angle)))
     for words, plane in _circling(rows):
         round_once = None if plane is None else circulation(seconds, plane)
         if round_once is not None:

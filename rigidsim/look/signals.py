@@ -25,7 +25,9 @@ _ORBIT_NORM = re.compile(r"orbit_norm_(\d+)")
 _IN_WORDS = {"energy_balance": "energy less work"}
 _AVERAGED = ("spin_averaged", "orbit_averaged")  # model levels whose datasets have axes but no attitude
 NEAR_AXIS = 0.35  # largest polar motion (rad) shown as such; beyond it, the body tumbles
-_JOINED = 0.4  # radii of the whole between neighbours of a path that is drawn as a line
+OVER_TIME = 0.8
+"""Radii of the whole between neighbours that are joined over time: some eight samples a turn."""
+_JOINED = 0.4  # the same of a path that is drawn as a line
 _ALIKE_PLANES = 1e-5  # between unit normals of planes that have one name
 _DEFINING = {
     "momentum": "angular_momentum", "spin": "angular_velocity", "core": "core_angular_velocity"

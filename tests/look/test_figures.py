@@ -92,7 +92,7 @@ def test_libration_in_time_and_in_planes() -> None:
             line.get_ydata(), np.rad2deg(dataset["roll_pitch_yaw"].sel(angle=name).values)
         )
     inside, outside = page.axes[0].get_lines()
-    assert (inside.get_label(), outside.get_label()) == ("in the orbit's plane − 180°", "out of it")
+    assert (inside.get_label(), outside.get_label()) == ("libration in plane − 180°", "out of plane")
     np.testing.assert_allclose(
         inside.get_ydata(), np.rad2deg(dataset["roll_pitch_yaw"].values[:, 1]), atol=1e-9
     )

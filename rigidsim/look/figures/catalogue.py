@@ -47,7 +47,7 @@ ROWS = 20_000  # that a figure draws
 _TELLING = 0.5  # changes of sign to a sample: four samples a swing
 _SETTLED, _SHORT = 0.05, 0.15  # of a curve's range, about its median; of a run that is shown enlarged
 _CYCLES = 14  # swings shown of the start, where there are many
-_NAME = 26  # letters that a name in the table has room for
+_NAME = 24  # letters that a name in the table has room for
 _CURVE, _PLANE, _FACT = 2.55, 4.7, 0.235  # heights, inches
 _WIDE, _NARROW = 12.4, 8.2
 _ROW = 5.2  # width and height of planes that stand side by side, inches
@@ -189,7 +189,7 @@ def flight(dataset: xarray.Dataset) -> Panel | None:
         view.line(position / scale, color=Z, lw=1.3, zorder=4)
         axes.plot(*view.flat(position[0] / scale), "o", color=Z, ms=4.5, zorder=5)
         view.box(position / scale, "XYZ", floors=[2])
-        titled(axes, f"Path in space [{unit}]")
+        titled(axes, f"Path in space [{unit}]", rows=2)  # of the upright axis' label
 
     return drawn
 

@@ -20,7 +20,7 @@ from matplotlib.ticker import MaxNLocator
 
 from rigidsim.look.curves import HUES, XYZ
 from rigidsim.look.curves import PALETTE as NAMES
-from rigidsim.look.signals import finite_rows, joined, title_of
+from rigidsim.look.signals import OVER_TIME, finite_rows, joined, title_of
 from rigidsim.look.solids import Array
 
 P = ParamSpec("P")
@@ -31,7 +31,6 @@ INK, PALE = "#1b2733", "#c3cbd5"
 START = "#0d0887"
 
 MOST_VECTOR_POINTS = 6000  # of a curve in an SVG; longer ones become pixels there
-_OVER_TIME = 0.8  # radii of the whole between neighbours that are joined: some eight samples a turn
 _KEY_ROW = 12.4  # height of a row of a key, points
 _KEY_LETTER, _TITLE_LETTER = 4.9, 6.1  # mean widths of a letter, points
 _MARGIN = 0.08  # of a square panel
@@ -175,7 +174,7 @@ def curve(
     Long ones are drawn as pixels in an SVG, which otherwise would weigh megabytes.
     """
     style.setdefault("rasterized", len(x) > MOST_VECTOR_POINTS)
-    whole = not sparse and (joined(np.stack([x, y], axis=1)) if in_plane else joined(y, _OVER_TIME))
+    whole = not sparse and (joined(np.stack([x, y], axis=1)) if in_plane else joined(y, OVER_TIME))
     if not whole:
         size = float(np.clip(9000 / max(len(x), 1), 2.0, 4.0))
         style |= {"linestyle": "none", "marker": ".", "markersize": size, "markeredgewidth": 0.0}

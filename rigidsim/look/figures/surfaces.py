@@ -223,7 +223,7 @@ def _polhode(axes: Axes, dataset: xarray.Dataset, rates: Array) -> None:
         view.line(points, color=PINK, lw=1.9, zorder=5)
         axes.plot(*view.flat(points[0]), "o", color=PINK, ms=4.0, zorder=6)
         view.box(points, names, range(3))
-        titled(axes, f"Path of ω in body axes [{unit}]")
+        titled(axes, f"Path of ω in body axes [{unit}]", rows=2)  # of the upright axis' label
         return
     energy, momentum = (radii / scale for radii in found)
     view = View.of(axes, _polhode_way(points, energy, moments))

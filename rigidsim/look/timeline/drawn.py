@@ -18,7 +18,7 @@ from rigidsim.look.curves import CURVES, Plot, drift_plot, other_plots, screen
 from rigidsim.look.pages import config_page, leading, notes_page, summary_page
 from rigidsim.look.paths import PATHS, Path, sections
 from rigidsim.look.record import events_of
-from rigidsim.look.signals import joined, need, optional
+from rigidsim.look.signals import OVER_TIME, joined, need, optional
 from rigidsim.look.solids import Array, Color, rotation_matrix
 from rigidsim.look.stages.parts import (
     NEAR,
@@ -292,8 +292,8 @@ def plot_parts(plot: Plot) -> list[Part]:
     style: dict[str, Any] = {
         "names": [label or plot.title for label in plot.labels],
         "colors": [screen(hue) for hue, _ in zip(cycle(plot.hues), plot.labels, strict=False)],
-        "widths": [1.5] * len(plot.labels),
     }
+    widths = [1.5] * len(plot.labels)
 
     def banded(rows: Rows) -> Columns:
         # a band of their uncertainty: the viewer draws the root of a variance
@@ -305,10 +305,13 @@ def plot_parts(plot: Plot) -> list[Part]:
     # amplitude; of a drift only the largest counts
     policies = rr.components.AggregationPolicy
     policy = policies.Max if plot.place == "drift" else policies.MinMax
-    found = [Part(path, [rr.Measurements.from_fields(**style)], banded)]
-    if plot.error is None:
-        look, curves = rr.SeriesLines(**style, aggregation_policy=policy), moving(rr.Scalars, scalars=shown)
-        found = [Part(path, [look], curves)]
+    look: Any = rr.SeriesLines(**style, widths=widths, aggregation_policy=policy)
+    # lines through samples far apart would draw a pattern; recorded values may be extremes of many rows
+    if plot.sparse or not (plot.recorded or plot.log or all(joined(column, OVER_TIME) for column in shown.T)):
+        look = rr.SeriesPoints(**style, marker_sizes=widths)
+    found = [Part(path, [look], moving(rr.Scalars, scalars=shown))]
+    if plot.error is not None:
+        found = [Part(path, [rr.Measurements.from_fields(**style, widths=widths)], banded)]
     for number, (label, value) in enumerate(plot.levels.items()):
         line = rr.SeriesLines(names=[label], colors=[screen("grey")], widths=[1.0])
         level = moving(rr.Scalars, scalars=np.full(len(shown), np.log10(value) if plot.log else value))
