@@ -502,7 +502,9 @@ def _tangents_of(run: _Run, start: float, end: float) -> ErrorTangents:
     measures = Measures(system)
     known: tuple[np.ndarray, np.ndarray] | None = None
     carrier: LaneCarrier | SteppedCarrier
-    if system.switches or run.steps < _BY_ITSELF:  # code for all motions isn't known, or would cost more
+    if (
+        system.switches or system.kicks or run.steps < _BY_ITSELF
+    ):  # code for all motions isn't known, or would cost more
         carrier = _stepped(run, start, end)
     else:
         carrier = LaneCarrier.of(system, _TOLERANCE, compact=run.steps * run.part < _UNROLLED)

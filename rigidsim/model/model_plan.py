@@ -124,7 +124,7 @@ def _choose_requirements(scene: Scene, loads: Sequence[Load]) -> Requirements:
         need: list(dict.fromkeys(load.title for load in loads if need in load.reads))
         for need in ("attitude", "flight")
     }
-    others = [(f"event {event.name}", states_read(event.expression)) for event in scene.events]
+    others = [(f"event {event.name}", event.reads) for event in scene.events]
     others += [(f"state {state.name}", states_read(state.derivative)) for state in scene.states]
     for who, states in others:
         for need in states & set(readers):

@@ -20,6 +20,7 @@ import heyoka as hy
 import rigidsim.model.observables.mechanical  # noqa: F401  (enters what it defines into the registry)
 from rigidsim.errors import ConfigError, Problem, ensure, required
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
+from rigidsim.model.impulses import Kick, kicks_of
 from rigidsim.model.kinematics import Poles
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
@@ -102,11 +103,16 @@ def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list
         sizes = [] if x.angles is None else [angle.squared_size for angle in x.angles(m)]
         variable = Recorded(
             x.name, x.dims, x.units, x.long_name, x.frame, len(outputs), count, x.unit_exponents(m, count),
-            x.conserved(m) is not None, x.continuity(m), sizes, x.poles(m), x.attributes(m),
+            _conserved(m, x) is not None, x.continuity(m), sizes, x.poles(m), x.attributes(m),
         )  # fmt: skip
         recorded.append(variable)
         outputs += components
     return recorded, outputs
+
+
+def _conserved(m: Mechanics, observable: Observable) -> str | None:
+    """Why it stays, if it does: across an impulse nothing but norms."""
+    return None if m.scene.impulses and observable.units != "1" else observable.conserved(m)
 
 
 def _of_state(m: Mechanics, state: OwnState) -> Observable:
@@ -129,7 +135,7 @@ def find_invariants(m: Mechanics, norms: list[Symbolic]) -> list[Invariant]:
     for observable in OBSERVABLES.values():
         if observable.drift_scale is None or not observable.available(m):
             continue
-        why = observable.conserved(m)
+        why = _conserved(m, observable)
         if why is None:
             continue
         scale, scale_name = observable.drift_scale(m)
@@ -187,6 +193,8 @@ class Crossing:
     stop: bool
     impossible: str = ""  # why the motion can't go on past it; empty for events of the config
     kind: str = ""  # of that ending, as its status names it
+    kicks: bool = False  # whether velocities change at it, as soon as it is found
+    known: bool = False  # whether they do at a known time, so that it isn't looked for
 
 
 class System:
@@ -399,7 +407,9 @@ class System:
         for event in self.scene.events:
             (expression,) = written(m, [event.expression], clocked=False)
             direction = self.scaling.direction * _DIRECTIONS[event.direction]
-            found.append(Crossing(event.name, expression, direction, event.stop))
+            kicks, known = event.impulse is not None, event.time is not None
+            kinds = {"kicks": kicks and not known, "known": kicks and known}
+            found.append(Crossing(event.name, expression, direction, event.stop, **kinds))
         endings = [(*one, kind) for kind in ENDINGS for load in m.loads for one in ENDINGS[kind](load, m)]
         endings += [
             (f"{expression.where} is negative", above_zero(m, expression), IMPOSSIBLE)
@@ -415,6 +425,17 @@ class System:
     def events(self) -> list[Crossing]:
         """The ``crossings`` that are events of the config."""
         return self.crossings[: len(self.scene.events)]
+
+    @cached_property
+    def kicks(self) -> list[Kick]:
+        """What changes at once at events."""
+        found = kicks_of(self.mechanics)
+        what = (
+            "given for an impulse, but the equations switch at kinks, jumps or shadows on the way; give time"
+        )
+        for event in self.scene.impulses if self.switches else ():
+            ensure(event.time is not None, required(event.impulse).fault("expression", what))
+        return found
 
     # --- what changes at given times, or is switched --------------------------------------------------------
 
@@ -433,7 +454,7 @@ class System:
     @property
     def stepwise(self) -> bool:
         """Whether it needs a stepper rather than the bare engine, because something happens between steps."""
-        return self.switches or self.pieces is not None
+        return self.switches or self.pieces is not None or bool(self.kicks)
 
     @cached_property
     def surfaces(self) -> list[Symbolic]:

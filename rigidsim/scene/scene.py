@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.scene import starts, units
-from rigidsim.scene.arithmetic import Matrix, Vector, context_for, cross, diagonal, dot, eigen
+from rigidsim.scene.arithmetic import Matrix, Vector, context_for, cross, diagonal, dot, eigen, vector
 from rigidsim.scene.bodies.body import (
     Body,
     RigidBody,
@@ -32,6 +32,7 @@ from rigidsim.scene.expressions.tree import (
     Constant,
     Expression,
     ExpressionError,
+    as_line,
     evaluate,
     names_used,
     states_read,
@@ -41,7 +42,7 @@ from rigidsim.scene.kernels.ephemeris import host_of, resolve_ephemeris
 from rigidsim.scene.point_masses import resolve_point_masses
 from rigidsim.scene.registry import LOADS, BroughtState, SceneLoad, Setting
 from rigidsim.scene.sample_times import SampleTimes, sample_times
-from rigidsim.scene.schema import Config
+from rigidsim.scene.schema import Config, EventTable
 from rigidsim.scene.swept import plain
 from rigidsim.scene.units import UnitError
 
@@ -52,13 +53,56 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
+class Impulse:
+    """What changes at once at an event.
+
+    Attributes:
+        body: name of the second body that it acts on; empty for ``[body]``.
+        axes: of the change of velocity: space, body or rtn.
+        velocity: change of velocity (mpf, m/s); None for none.
+        rates: change of angular velocity (mpf, rad/s, body axes); None for none.
+        momentum: angular impulse in its place (mpf, kg m^2/s, body axes).
+        where: its place in the config.
+    """
+
+    body: str
+    axes: str
+    velocity: Vector | None
+    rates: Vector | None
+    momentum: Vector | None
+    where: str
+
+    @property
+    def reads(self) -> set[str]:
+        """States that it needs or changes, see ``Load.reads``."""
+        needs = {"flight": self.velocity is not None, "attitude": self.axes == "body"}
+        return {need for need, holds in needs.items() if holds}
+
+    def fault(self, key: str, text: str) -> ConfigError:
+        """The error that names a key of it."""
+        return ConfigError(Problem(f"{self.where} {key}", text))
+
+
+@dataclass(frozen=True)
 class Event:
-    """One event of a scene: its direction is any, up or down; with ``stop`` the run ends there."""
+    """One event of a scene: its direction is any, up or down; with ``stop`` the run ends there.
+
+    Attributes:
+        time: of a single crossing that depends on the time alone (mpf, s); None for any other.
+        impulse: what it changes; None for nothing.
+    """
 
     name: str
     expression: Expression
     direction: str
     stop: bool
+    time: Any = None
+    impulse: Impulse | None = None
+
+    @property
+    def reads(self) -> frozenset[str]:
+        """States that it needs, see ``Load.reads``."""
+        return states_read(self.expression) | (set() if self.impulse is None else self.impulse.reads)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,7 +178,12 @@ class Scene(Setting):
 
     def as_motion(self, **keys: Any) -> Scene:
         """The scene of the same motion alone (see ``Config.as_motion``)."""
-        return replace(self, config=self.config.as_motion(**keys), events=())
+        return replace(self, config=self.config.as_motion(**keys), events=self.impulses)
+
+    @property
+    def impulses(self) -> tuple[Event, ...]:
+        """Those of the events that change the motion."""
+        return tuple(event for event in self.events if event.impulse is not None)
 
     def formulas(self) -> list[Expression]:
         """All expressions."""
@@ -284,12 +333,46 @@ def _resolved_events(setting: Setting) -> tuple[Event, ...]:
     found = []
     for number, table in enumerate(setting.config.events):
         here = setting.at("events", number)
-        expression = here.expression("expression", table.expression, jumps=False)
+        if table.time is None:
+            expression = here.expression("expression", table.expression, jumps=False)
+        else:
+            known = {**setting.config.parameters, "time__": table.time}
+            expression = here.expression("time", "t - time__", parameters=known)
         if not names_used(expression):
             what = f'given "{table.expression}", which never changes; use {", ".join(setting.names)}'
             raise here.fault("expression", what)
-        found.append(Event(table.name, expression, table.direction, table.action == "stop"))
+        line = as_line(expression, setting.context)
+        rises = {"any": 0, "up": 1, "down": -1}[table.direction]
+        once = line is not None and line.slope * rises >= 0
+        event = Event(table.name, expression, table.direction, table.action == "stop")
+        event = replace(event, time=line.zero) if once else event
+        found.append(
+            replace(event, impulse=_impulse(table, event, here)) if table.action == "impulse" else event
+        )
     return tuple(found)
+
+
+def _impulse(table: EventTable, event: Event, here: Setting) -> Impulse:
+    context, names = here.context, [one.name for one in here.config.rigid_bodies]
+    if table.body not in (None, *names):
+        allowed = f"allowed: {', '.join(names)}" if names else "there are no [[rigid_bodies]]"
+        raise here.fault("body", f'given "{table.body}"; {allowed}; leave it out for [body]')
+    moves = here.free_flight or bool(names)
+    what = "given, but [body] has no place; give [initial] position or velocity, or change angular_velocity"
+    ensure(table.velocity is None or moves, here.fault("velocity", what))
+    if event.time is None:
+        what = (
+            "can't be found from behind, after what it changed; give time in its place, or end the run later"
+        )
+        ensure(here.end >= here.start, here.fault("expression", f'given "{table.expression}", which {what}'))
+    elif event.time == here.start:
+        what = f"is the start ({context.nstr(event.time, 6)} s); let it begin with other velocities instead"
+        raise here.fault("time" if table.time else "expression", what)
+    velocity, rates, momentum = (
+        None if given is None else vector(context, given)
+        for given in (table.velocity, table.angular_velocity, table.angular_impulse)
+    )
+    return Impulse(table.body or "", table.axes, velocity, rates, momentum, here.where(""))
 
 
 def _dated(setting: Setting, loads: Iterable[SceneLoad]) -> Setting:

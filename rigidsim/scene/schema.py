@@ -310,18 +310,48 @@ class Output(ConfigTable):
 
 
 class EventTable(ConfigTable):
-    """``[[events]]``: where an expression of time and the state crosses zero."""
+    """``[[events]]``: a moment, or where an expression of time and the state crosses zero."""
+
+    rules = (
+        one_of("time", "expression"),
+        one_of("angular_velocity", "angular_impulse", least=0),
+        excludes("time", "direction"),
+    )
 
     name: VariableName = Field(examples=["flip"])
     """prefix of the dataset's variables: NAME_time, NAME_quaternion, ..."""
-    expression: StrictStr = Field(examples=["wy", "theta - pi/2"])
+    time: Second | None = Field(None, examples=["10 day"])
+    """time of the event, instead of expression"""
+    expression: StrictStr | None = Field(None, examples=["wy", "theta - pi/2"])
     """expression of t, the states (wx wy wz, qw qx qy qz, phi theta psi, x y z, vx vy vz) and [parameters],
     in SI; the event is its crossing of zero
     """
     direction: Literal["any", "up", "down"] = "any"
     """direction of the crossing"""
-    action: Literal["record", "stop"] = "record"
-    """record the event, or stop the run at it"""
+    action: Literal["record", "stop", "impulse"] = "record"
+    """record the event, stop the run at it, or change velocities at it at once"""
+    body: StrictStr | None = Field(None, examples=["dimorphos"])
+    """body that the impulse acts on: a name of [[rigid_bodies]]; by default [body]"""
+    velocity: Triple[Speed] | None = Field(None, examples=[[0, "-2.6 mm/s", 0]])
+    """impulse: change of the body's velocity, in axes"""
+    axes: Literal["space", "body", "rtn"] = "space"
+    """axes of this velocity; rtn: outwards (from the origin, or from [body]), along the orbit, its normal"""
+    angular_velocity: Triple[Rate] | None = Field(None, examples=[[0, 0, "0.1 deg/s"]])
+    """impulse: change of the body's angular velocity, body axes"""
+    angular_impulse: Triple[Momentum] | None = Field(None, examples=[[0, 0, "0.02 kg m^2/s"]])
+    """impulse: angular impulse on the body (N m s), body axes, instead of angular_velocity"""
+
+    @model_validator(mode="after")
+    def _changes_something(self) -> EventTable:
+        keys = "velocity", "angular_velocity", "angular_impulse"
+        given = [key for key in (*keys, "body", "axes") if key in self.model_fields_set]
+        if self.action != "impulse" and given:
+            raise refuse(f'given {" and ".join(given)} with action = "{self.action}"; set action = "impulse"')
+        if self.action == "impulse" and not set(given) & set(keys):
+            raise refuse(
+                f'given action = "impulse" without what changes; add {", ".join(keys[:2])} or {keys[2]}'
+            )
+        return self
 
 
 class Limits(ConfigTable):
@@ -813,6 +843,14 @@ class Config(ConfigTable):
             changes["frame"] = self.frame.model_copy(update={"axes": "GCRF"})
         return self.model_copy(update=changes) if changes else self
 
+    @property
+    def impulses(self) -> list[EventTable]:
+        """The events if any change the motion, at their places; others are recorded and stop nothing."""
+        if not any(event.action == "impulse" for event in self.events):
+            return []
+        plain = {"action": "record"}
+        return [x if x.action == "impulse" else x.model_copy(update=plain) for x in self.events]
+
     def as_motion(self, record: Sequence[str] = ("quaternion",), **integrator: Any) -> Self:
         """The config of the same motion alone, without what is only watched or judged: a quaternion in steps,
         without projections, unless the keys of ``[integrator]`` given here say otherwise.
@@ -824,7 +862,7 @@ class Config(ConfigTable):
         tables = {
             "integrator": self.integrator.model_copy(update=plain | judged | integrator),
             "output": self.output.model_copy(update=output),
-            "events": [],
+            "events": self.impulses,
         }
         return self.model_copy(update=tables)
 

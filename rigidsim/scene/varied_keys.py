@@ -24,7 +24,7 @@ from rigidsim.scene.schema import config_model
 from rigidsim.scene.starts import rotation_of
 
 ATTITUDE = "initial.attitude"
-_TABLES = ("body", "initial", "loads", "rotors", "parameters", "states", "bodies", "rigid_bodies")
+_TABLES = ("body", "initial", "loads", "rotors", "parameters", "states", "bodies", "rigid_bodies", "events")
 _WHERE = "[output] sensitivity"
 _TENSOR = ("body", "inertia_tensor")
 

@@ -27,7 +27,7 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.model.formulations.formulation import ModelPlan, Quaternion
 from rigidsim.model.load import Load
 from rigidsim.model.model_plan import plan_model
@@ -76,6 +76,8 @@ def refuse_without_derivatives(scene: Scene, system: System, *, has_steps: bool,
         )
     elif len(system.crossings) > len(system.events):
         why = "the motion may end (a body changes, or touches another one), where variational equations end"
+    elif any(kick.time is None for kick in system.kicks):
+        why = "an impulse acts where an expression vanishes, at a time that changes with it; give it a time"
     elif scene.found_start is not None:
         why = "the start is an equilibrium that is found, not given; give its attitude and rates instead"
     if why:
@@ -112,11 +114,13 @@ class _Pass:
     noted: list[Any]
     outputs: list[Symbolic]
     equations: list[Symbolic]
+    kicks: list[tuple[Any, dict[int, Symbolic]]]
 
     @property
     def form(self) -> list[int]:
         """Hashes, since wide expressions share parts that a comparison would walk through again and again."""
-        return [hash(x) for x in (*self.equations, *self.outputs)]
+        changed = [x for _, states in self.kicks for x in states.values()]
+        return [hash(x) for x in (*self.equations, *self.outputs, *changed)]
 
 
 class Parametrised:
@@ -128,6 +132,7 @@ class Parametrised:
         context: arithmetic in which all is worked out.
         plain: the same motion in plain numbers, for pieces of the equations and for names.
         equations: right-hand sides with ``hy.par[first + i]`` for coefficient i.
+        kicks: times at which states change at once, and what they are then, likewise.
         outputs: components of what is recorded of it (``recorded``), in the same way.
         recorded: attitude, rates, flight, rotors, core, user-defined states, and what else was asked for.
         first: number of parameters that the equations have themselves.
@@ -153,12 +158,18 @@ class Parametrised:
         base, found, moved = self._passes(self.values)
         self.plain = System(base.system.plan, number)  # with all that acts once no number is exactly zero
         self.first = parameters_of(self.plain)
+        times = [[time for time, _ in one.kicks] for one in (base, *moved)]
+        what = "names the time of an impulse; give the derivative by its velocity instead, or shift the start"
+        ensure(
+            not any(self._differ(x, y) for other in times for x, y in zip(other, times[0], strict=True)),
+            ConfigError(Problem(WHERE, what), experiment.source),
+        )
         self._varied = [
             i for i, x in enumerate(base.noted) if any(self._differ(m.noted[i], x) for m in moved)
         ]
         self._fixed = {i: x for i, x in enumerate(base.noted) if i not in set(self._varied)}
         made = self._pass(found, self._as_parameters())
-        self.equations, self.outputs = made.equations, made.outputs
+        self.equations, self.outputs, self.kicks = made.equations, made.outputs, made.kicks
         self.recorded = recorded_variables(self.plain.mechanics.observed, self._record)[0]
         self._refuse_hidden(base, found, made)
         self.coefficients = self._coefficients(base, moved)
@@ -249,7 +260,8 @@ class Parametrised:
         system = System(replace(plan, formulation=Quaternion()), noting)
         equations = [right for _, right in system.equations]
         outputs = recorded_variables(system.mechanics.observed, self._record)[1]
-        return _Pass(system, noted, [hy.expression(x) for x in outputs], equations)
+        kicks = [(x.time, {system.states.index(n): y for n, y in x.states.items()}) for x in system.kicks]
+        return _Pass(system, noted, [hy.expression(x) for x in outputs], equations, kicks)
 
     def _as_parameters(self) -> Callable[[int, Any], Any]:
         places = {i: self.first + n for n, i in enumerate(self._varied)}
@@ -355,9 +367,15 @@ class KeyTangents:
     def __init__(self, made: Parametrised, precision: Precision, *, quickly: bool = False) -> None:
         self.made, self.precision, self.system = made, precision, made.plain
         self.keys, system = len(made.keys), made.plain
-        alone = system.pieces is None and not system.clocked and not system.switches and made.first == 0
+        alone = (
+            system.pieces is None
+            and not made.kicks
+            and not system.clocked
+            and not system.switches
+            and made.first == 0
+        )
         small = not system.wide and len(system.states) <= _MOST_STATES
-        derivatives = Derivatives(system, made.equations, made.outputs, made.first, made.count)
+        derivatives = Derivatives(system, made.equations, made.outputs, made.first, made.count, made.kicks)
         slopes = made.coefficients.initial_slopes
         self._moving = derivatives.felt([i for i, row in enumerate(slopes) if any(x != 0 for x in row)])
         equations, (along,) = derivatives.equations(self._moving, 1)

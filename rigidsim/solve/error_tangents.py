@@ -224,7 +224,7 @@ class SteppedCarrier:
             self._set(first, first + shift, states[:, 0] + factor * tangents[:, 0, j])
             if not self._near.to(until + shift):
                 return states * np.nan, moved, taken, time
-            moved[:, 0, j] = (np.array(self._near.state, dtype=float) - base) / factor
+            moved[:, 0, j] = (np.array(self._near.mark().state, dtype=float) - base) / factor
         # what moves in the run's arithmetic alone is rounded, too: a last bit shows that it does
         still = np.array([x == y for x, y in zip(marks[-1].state, known.state, strict=True)])
         own = np.where((own == states[:, 0]) & ~still, np.nextafter(own, np.inf), own)

@@ -26,6 +26,7 @@ BESIDE = 60
 """Size of the offset that moves an expression off a zero at a step's beginning, in bits below a rounding of
 one.
 """
+_WIDTH = 2.0**8  # roundings of a time between two findings of the same crossing
 DIRECTIONS = {
     0: hy.event_direction.any,
     1: hy.event_direction.positive,
@@ -53,9 +54,16 @@ class EventLog:
     stop: Scalar | None = None  # time of the first crossing that ends the run, or None
     quiet_until: Scalar | None = None  # time up to which crossings are already known; None if there are none
     muted: bool = False  # whether a step is being repeated whose crossings are already known
+    kicked: list[Scalar] = field(default_factory=list)  # times at which it did, in any part of the motion
+    due: FoundEvent | None = None  # the first crossing that changes the motion, which has yet to do so
 
     def note(self, index: int, time: Scalar, state: np.ndarray) -> None:
         """Record a crossing found by the engine; raises a StoppedError if there are too many."""
+        if self.due is not None and time > self.due.time:
+            return
+        if self.stop is None or time <= self.stop:
+            kicks = self.crossings[index].kicks and self.due is None
+            self.due = FoundEvent(index, time, np.array(state), self.angles()) if kicks else self.due
         if self.muted or (self.quiet_until is not None and time <= self.quiet_until):
             return
         if len(self.found) >= MOST_EVENTS:
@@ -68,6 +76,13 @@ class EventLog:
         self.found.append(FoundEvent(index, time, np.array(state), self.angles()))
         if self.crossings[index].stop and self.stop is None:
             self.stop = time
+
+    def began_there(self, integrator: TaylorEngine, time: Scalar, precision: Precision) -> bool:
+        """Whether a crossing that changes the motion is the one at which the engine's step began."""
+        begin = integrator.time - integrator.last_h
+        width = precision.of_double(_WIDTH * float(precision.epsilon) * max(abs(float(time)), 1.0))
+        known = [*self.kicked, *(f.time for f in self.found if self.crossings[f.index].kicks)]
+        return any(abs(begin - at) <= width and abs(time - at) <= width for at in known)
 
     @property
     def ending(self) -> FoundEvent | None:
@@ -97,6 +112,7 @@ class EventLog:
         if count > len(self.found):
             raise ValueError(f"{len(self.found)} events are known, not {count}")
         del self.found[count:]
+        self.due = None
         ending = self.ending
         self.stop = None if ending is None else ending.time
 
@@ -133,6 +149,8 @@ def engine_events(
 
     def callback(index: int) -> Callable[[TaylorEngine, Scalar, int], None]:
         def called(integrator: TaylorEngine, time: Scalar, _: int) -> None:
+            if system.crossings[index].kicks and log.began_there(integrator, time, precision):
+                return
             log.note(index, time, integrator.update_d_output(time))
 
         return called
@@ -142,12 +160,14 @@ def engine_events(
     expressions = []
     for i, expression in enumerate(meant):
         shifted = expression if offsets is None else expression + hy.par[offsets + i]
-        expressions.append(shifted + 2.0 ** (-precision.bits - BESIDE) if at_zero[i] else shifted)
+        apart = at_zero[i] or system.crossings[i].kicks  # each step after an impulse begins on a zero
+        expressions.append(shifted + 2.0 ** (-precision.bits - BESIDE) if apart else shifted)
     return [
         hy.nt_event(expression, callback(i), direction=DIRECTIONS[c.direction], fp_type=precision.scalar)
         for i, (c, expression) in enumerate(
             zip(system.crossings, of_order_one(system, expressions, meant), strict=True)
         )
+        if not c.known
     ]
 
 

@@ -79,7 +79,7 @@ class SamplesWithin:
 
     def back_to(self, count: int) -> None:
         """Forget all but the first."""
-        del self.states[count:]
+        self.states = self.states[:count]
         self.ended = False
 
 

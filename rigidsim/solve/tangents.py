@@ -23,7 +23,7 @@ import numpy as np
 
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
-from rigidsim.solve.compiled import compiled_engine
+from rigidsim.solve.compiled import compiled_engine, compiled_function
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.requirements import SetAtKnots
 from rigidsim.solve.stepper import longest_step
@@ -57,6 +57,7 @@ class Derivatives:
     Args:
         rights: right-hand sides of all states.
         first, count: numbers of the first of the parameters that are coefficients, and how many there are.
+        kicks: internal times at which states change at once, and what they are then, by their numbers.
     """
 
     def __init__(
@@ -66,11 +67,17 @@ class Derivatives:
         outputs: Sequence[Symbolic] = (),
         first: int = 0,
         count: int = 0,
+        kicks: Sequence[tuple[Any, Mapping[int, Symbolic]]] = (),
     ) -> None:
         self.system, self.rights, self.outputs = system, list(rights), list(outputs)
-        self.first, self.count = first, count
-        self.by_state = jacobian_rows([*rights, *outputs], system.variables)
-        self.by_coefficient = jacobian_rows([*rights, *outputs], [hy.par[first + m] for m in range(count)])
+        self.first, self.count, self.kicks = first, count, list(kicks)
+        whole = [*rights, *outputs]
+        self.kick_rows: list[dict[int, int]] = []  # of each kick, the row of each state
+        for _, states in kicks:
+            self.kick_rows.append(dict(zip(states, range(len(whole), len(whole) + len(states)), strict=True)))
+            whole += states.values()
+        self.by_state = jacobian_rows(whole, system.variables)
+        self.by_coefficient = jacobian_rows(whole, [hy.par[first + m] for m in range(count)])
 
     @classmethod
     def of(cls, system: System) -> Derivatives:
@@ -81,13 +88,18 @@ class Derivatives:
         """States whose offsets depend on those of some states and of the coefficients, and that an output
         depends on, if there are outputs. Those that pieces set anew have no tangents.
         """
-        states = range(len(self.rights))
-        moved = {*begun, *(i for i in states if self.by_coefficient[i])}
-        while more := {i for i in states if i not in moved and moved & self.by_state[i].keys()}:
+        rows = {i: [i, *(x[i] for x in self.kick_rows if i in x)] for i in range(len(self.rights))}
+        moved = {*begun, *(i for i, of in rows.items() if any(self.by_coefficient[row] for row in of))}
+        while more := {
+            i for i, of in rows.items() if i not in moved and any(moved & self.by_state[x].keys() for x in of)
+        }:
             moved |= more
         if self.outputs:
-            wanted = {i for row in self.by_state[len(self.rights) :] for i in row}
-            while more := {i for row in wanted for i in self.by_state[row] if i not in wanted}:
+            after = range(len(self.rights), len(self.rights) + len(self.outputs))
+            wanted = {i for row in after for i in self.by_state[row]}
+            while more := {
+                i for j in wanted for row in rows[j] for i in self.by_state[row] if i not in wanted
+            }:
                 wanted |= more
             moved &= wanted
         pieces = self.system.pieces
@@ -161,12 +173,45 @@ class Tangents:
         self._engine = compiled_engine(equations, zeros, **{**precision.options, **options})
         self._longest = precision.of_double(longest_step(self._engine.order, precision.scalar))
         self._knots = None if system.pieces is None else SetAtKnots(system)
+        along = {i: hy.make_vars(f"tangent_0_{names[i]}") for i in moving}
+        self._kicks = sorted(
+            (
+                (precision.number(time), self._changing(states, rows, along))
+                for (time, states), rows in zip(derivatives.kicks, derivatives.kick_rows, strict=True)
+                if time > system.start
+            ),
+            key=lambda kick: kick[0],
+        )
         self._clock = system.parameters - 1 if system.clocked else None
         read = [*system.turning, *system.signed]
         self._read = hy.cfunc(read, system.variables, compact_mode=True) if read else None
         self._stride = 1 if read or system.clocked else _STRIDE
         self._turned: Turned | None = None
         self._place: Place | None = None
+
+    def _changing(
+        self, states: Mapping[int, Symbolic], rows: Mapping[int, int], along: Mapping[int, Symbolic]
+    ) -> tuple[Any, list[int], list[int]]:
+        """What changes at once: values and offsets as a function of state and a tangent, and their places."""
+        moved, first = [i for i in rows if i in along], self.slopes(0).start
+        changed = [*states.values(), *(self._made.along(rows[i], along, first) for i in moved)]
+        variables = [*self.system.variables, *along.values()]
+        function = compiled_function(changed, variables, compact_mode=True, **self.precision.options)
+        return function, list(states), [list(self.moving).index(i) for i in moved]
+
+    def _kick(self) -> Scalar | None:
+        """Change at once what changes here; returns the next time at which something does."""
+        engine, first = self._engine, self.slopes(0)
+        for function, states, moved in (found for at, found in self._kicks if engine.dtime == (at, 0)):
+            before, numbers = np.array(engine.state), self.numbers.copy()
+            for j in range(self.count):
+                part = self.of(j)
+                numbers[first] = self.numbers[self.slopes(j)] * self._power(-int(self._exponents[j]))
+                given = {"pars": numbers[: function.nparams]} if function.nparams else {}
+                after = function(np.concatenate([before[: self.states], before[part]]), **given)
+                engine.state[states] = after[: len(states)]
+                engine.state[[part.start + i for i in moved]] = after[len(states) :]
+        return next((at for at, _ in self._kicks if at > engine.time), None)
 
     def slopes(self, tangent: int) -> slice:
         """See ``Derivatives``."""
@@ -261,9 +306,11 @@ class Tangents:
 
     def _go(self, until: Scalar | None, most: int) -> None:
         """Take natural steps, none beyond a time or what the equations allow."""
-        engine = self._engine
+        engine, kick = self._engine, self._kick()
         self._scale()
         end = self._meet()
+        if kick is not None:
+            end = kick if end is None else min(end, kick)
         if until is not None:
             end = until if end is None else min(end, until)
         if end is None:
@@ -273,6 +320,8 @@ class Tangents:
             options = {"max_steps": most, "max_delta_t": self._longest, "write_tc": True}
             outcome, _, _, taken, *_ = engine.propagate_until(end, **options)
             self.steps += int(taken)
+            if kick is not None and abs(engine.time - kick) <= 4 * float(self.precision.epsilon) * abs(kick):
+                engine.dtime = (kick, kick * 0)
         if outcome == hy.taylor_outcome.err_nf_state or not np.isfinite(engine.state.astype(float)).all():
             raise LostTangents("they are no longer finite")
 

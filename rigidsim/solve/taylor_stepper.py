@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable, Mapping
 
@@ -11,6 +12,7 @@ import numpy as np
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import TaylorEngine, compiled_engine, interruptible
 from rigidsim.solve.events import EventLog, engine_events
+from rigidsim.solve.impulses import Due, Impulses
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.requirements import Far, StepCallback, requirement_of
 from rigidsim.solve.stepper import Mark, SamplesWithin, Stepper, bound_of_sparse_series, longest_step
@@ -40,7 +42,13 @@ class TaylorStepper(Stepper):
         start: Scalar,
         log: EventLog | None = None,
     ) -> None:
+        if any(kick.time is None for kick in system.kicks):
+            log = log or EventLog(system.crossings)  # which the motion depends on
         super().__init__(system, precision, log)
+        self._impulses = Impulses(system, precision)
+        self._due: Due | None = None  # what acts before the next step
+        self._coming: Due | None = None  # what is next at a known time
+        self._earlier: TaylorEngine | None = None  # of the step in which the motion changed
         self._tolerance, self._start = tolerance, start
         self._requirement = requirement_of(system)
         self.has_events = log is not None and bool(system.crossings)
@@ -123,12 +131,45 @@ class TaylorStepper(Stepper):
 
     def _meet(self) -> Scalar | None:
         """Set what the equations need here; returns the time beyond which no step may go, None for any."""
-        return _earlier(self._requirement.meet(self._integrator), self.until)
+        self._kick()
+        return _earlier(self._requirement.meet(self._integrator), self._until)
+
+    @property
+    def _until(self) -> Scalar | None:
+        """The time beyond which no step may go that begins here, whatever the equations need."""
+        coming = self._impulses.after(self.time)
+        return _earlier(self.until, None if coming is None else coming.time)
+
+    def _hold(self, samples: SamplesWithin | None = None) -> None:
+        """Stop where an impulse acts within the latest step, or at its end."""
+        engine, due, coming = self._integrator, self.log.due, self._coming
+        if due is not None:
+            if samples is not None:
+                samples.back_to(len(samples.until(due.time)))
+            self._earlier, self.log.due = copy.deepcopy(engine), None
+            engine.dtime = (due.time, due.time * 0)
+            engine.state[:] = due.state
+            self._due = Due(due.time, [due.index])
+            self.log.kicked.append(due.time)
+        elif coming is not None and abs(coming.time - engine.time) <= 4 * self._epsilon * abs(coming.time):
+            engine.dtime = (coming.time, coming.time * 0)
+            self._due = coming
+            for event in coming.events if self.has_events else ():
+                self.log.note(event, coming.time, engine.state)
+
+    def _kick(self) -> None:
+        """Let what is due act, and look for what comes."""
+        if self._due is not None:
+            system = self._system_of(self._chart)
+            self._integrator.state[:] = self._impulses.changed(system, self._due, self._integrator.state)
+            self._due = None
+            self.settle()
+        self._earlier, self._coming = None, self._impulses.after(self.time)
 
     @property
     def end(self) -> Scalar | None:
         """The time beyond which no step that begins now may go; None for any."""
-        return _earlier(self._requirement.end_after(self.time), self.until)
+        return _earlier(self._requirement.end_after(self.time), self._until)
 
     def _watched(
         self, *samples: Callable[[TaylorEngine], bool]
@@ -138,6 +179,8 @@ class TaylorStepper(Stepper):
         if self.watcher is not None:
             self.watcher.begin(self._integrator.time)
             watching.append(self.watcher)
+        if any(crossing.kicks for crossing in self.log.crossings):
+            watching.append(lambda _: self.log.due is None)
         return [*self._requirement.each, *watching, *samples] or None
 
     @property
@@ -158,6 +201,7 @@ class TaylorStepper(Stepper):
         return self._integrator.state
 
     def mark(self) -> Mark:
+        self._kick()
         engine, found = self._integrator, len(self.log.found)
         return Mark(engine.dtime, np.array(engine.state), found, self.steps, self._tiny)
 
@@ -166,6 +210,7 @@ class TaylorStepper(Stepper):
         self._integrator.state[:] = mark.state
         self.log.back_to(mark.events)
         self.steps, self._tiny, self.unresolved = mark.steps, mark.memory, False
+        self._due = self._earlier = None
 
     def pack(self, memory: int) -> dict[str, np.ndarray]:
         """See ``Stepper``: the number of latest steps in a row that were tiny."""
@@ -194,10 +239,12 @@ class TaylorStepper(Stepper):
 
     def step(self) -> bool:
         """Take one step with dense output; False if the state is no longer finite."""
-        return self._propagate(self._meet(), 1, dense=True)
+        going = self._propagate(self._meet(), 1, dense=True)
+        self._hold()
+        return going
 
     def dense(self, time: Scalar) -> np.ndarray:
-        return np.array(self._integrator.update_d_output(time))  # heyoka reuses its buffer
+        return np.array((self._earlier or self._integrator).update_d_output(time))  # heyoka reuses its buffer
 
     def take(self, count: int, samples: SamplesWithin | None = None) -> bool:
         """See ``Stepper``."""
@@ -206,8 +253,15 @@ class TaylorStepper(Stepper):
             end = self._meet()
             if not self._within_piece(last - self.steps, end, samples):
                 return False
+            self._hold(samples)
             smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
-            if end is None or end == self.until or self.time != end or self.steps >= last:
+            if (
+                self._due is not None
+                or end is None
+                or end == self.until
+                or self.time != end
+                or self.steps >= last
+            ):
                 break
             wanted = samples is not None and not samples.ended and self.watcher is None
             if not wanted or self.unresolved or self.collapsed or self.log.stop is not None:
@@ -221,7 +275,7 @@ class TaylorStepper(Stepper):
         in the piece before.
         """
         engine, before = self._integrator, self._integrator.dtime
-        far = self._requirement.far(before, end, self.until) if end is not None and self._whole else None
+        far = self._requirement.far(before, end, self._until) if end is not None and self._whole else None
         if far is not None:
             return self._propagate(far[0], count, samples, far=far)
         plain = end is None and not self._requirement.each and before[1] == 0

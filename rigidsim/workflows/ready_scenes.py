@@ -46,7 +46,7 @@ SUBJECTS: Mapping[str, tuple[str, ...]] = {
         "mars_with_table",
         "mars_obliquity", "earth_deep_time", "phobos_libration", "vesta_nutation",
     ),
-    "Two rigid bodies": ("didymos", "didymos_after_dart", "kw4_1999", "antiope"),
+    "Two rigid bodies": ("didymos", "didymos_impact", "didymos_after_dart", "kw4_1999", "antiope"),
     "Under JPL's ephemerides (pip install 'rigidsim[ephemeris]')": (
         "moon_since_1969", "rigid_moon", "rigid_earth_nutation", "mars_nutation", "mercury_libration",
         "apophis_2029",

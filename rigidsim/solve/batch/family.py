@@ -69,6 +69,7 @@ NotBatchable = Enum(
         "ACCURACY": "the accuracy asked for is settled run by run",
         "CHART": "Euler angles may have to change their sequence on the way",
         "ANGLES": "full turns of recorded angles are counted along the motion",
+        "IMPULSE": "velocities change at once on the way",
         "SWITCHING": "the equations change along the motion",
         "MOVED_MASS": "the body changes in ways that may end its motion",
         "TABLE": "an orbit goes by a table",
@@ -116,6 +117,7 @@ def _reason_of_system(prepared: InitialValueProblem, system: System) -> NotBatch
     known |= {"unwrap"} if averaged else set()
     reasons = {
         NotBatchable.EFFECT: bool(registered_effects(system, _DOUBLE)),
+        NotBatchable.IMPULSE: bool(system.kicks),
         NotBatchable.SWITCHING: system.switches,
         NotBatchable.MOVED_MASS: len(system.crossings) > len(system.events),
         NotBatchable.TABLE: (system.pieces is not None and not averaged) or system.mechanics.sky is not None,

@@ -213,6 +213,8 @@ def closed_form_of(scene: Scene, *, driven: bool = False) -> ClosedForm:
     """The closed form of a scene; raises NoClosedForm if it has none."""
     if driven:
         raise NoClosedForm("a load given from Python has no closed form")
+    for event in scene.impulses:
+        raise NoClosedForm(f"the impulse {event.name} has no closed form")
     for load in scene.loads:
         raise NoClosedForm(f"{load.title} has no closed form here")
     for state in scene.states:

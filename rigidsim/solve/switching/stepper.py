@@ -142,6 +142,7 @@ class SwitchingStepper(TaylorStepper):
         return self._functions_by_chart[self._chart]
 
     def mark(self) -> Mark:
+        self._kick()
         engine, turned = self._integrator, self._turned
         sides = *self._modes, *turned.angles, *turned.quaternion, self._crossed, self._count, self._since
         memory = self._tiny, sides
@@ -257,6 +258,7 @@ class SwitchingStepper(TaylorStepper):
 
     def _meet(self) -> Scalar | None:
         """Continue with the piece of the equations that begins here, if one does."""
+        self._kick()
         if isinstance(self._requirement, SetAtKnots):
             self._piece = self._piece_of(self._requirement.enter(self._integrator))
         return self.end
@@ -385,6 +387,7 @@ class SwitchingStepper(TaylorStepper):
             sizes = [one.size for one in passed[:kept]]
             self.smallest, self.largest, self._dense = min(sizes), max(sizes), engine
             self._judge(begun.time[0], kept)
+            self._hold()
         return alone
 
     def _crosses(self, engine: TaylorEngine, j: int, side: int) -> bool:
@@ -540,6 +543,7 @@ class SwitchingStepper(TaylorStepper):
             return False
         if self._along:
             self._keep_to_surfaces()
+        self._hold()
         return True
 
     def _note_events(self, before: np.ndarray, begun: Scalar, known: int) -> None:
@@ -551,7 +555,11 @@ class SwitchingStepper(TaylorStepper):
         values, noises = self._functions.crossings(states, times, np.array([pars, pars]))
         crossed = (np.abs(values[:, 1]) <= noises[:, 1]) & (noises[:, 1] < np.abs(values[:, 0]))
         for i in np.flatnonzero(crossed).tolist():
-            if i not in noted and self.system.crossings[i].direction * values[i, 0] <= 0:
+            if (
+                i not in noted
+                and not self.system.crossings[i].known
+                and self.system.crossings[i].direction * values[i, 0] <= 0
+            ):
                 self.log.note(i, self.time, self.state)
 
     def _natural(self, until: Scalar | None, longest: Scalar) -> bool:

@@ -124,7 +124,9 @@ def observing(experiment: Experiment) -> Iterator[tuple[list[Observed], Experime
                 entered.append(name)
                 also += [state for state in states if state in own]
             names.append(name)
-        quiet = experiment.quiet([*dict.fromkeys([*names, *also])], events=[], fit=None)
+        quiet = experiment.quiet(
+            [*dict.fromkeys([*names, *also])], events=experiment.config.impulses, fit=None
+        )
         recorded = {one.name: one for one in prepare(quiet).system.recorded}
         found = []
         for text, name in zip(texts, names, strict=True):
@@ -696,7 +698,7 @@ class ByDifferences:
         """Predictions alone."""
         try:
             changed = self._keys.experiment(values, self._quiet)
-            made = sampled(changed, times, self._quiet.config.output.record, events=[], fit=None)
+            made = sampled(changed, times, self._quiet.config.output.record, fit=None)
         except ConfigError as error:
             raise NotPredicted(f"the experiment can't be run at these values: {error}") from None
         dataset = made.dataset
