@@ -127,20 +127,23 @@ def _numbers(
 
 
 def _plain_numbers(table: TextTable) -> np.ndarray | None:
-    """Numbers (rows, columns) of lines that hold nothing else, between white space, in a third of the time;
+    """Numbers (rows, columns) of lines that hold nothing else, between white space, in a fifth of the time;
     None of other lines.
     """
-    lines, count = list(islice(table.lines(), table.head, None)), len(table.names)
-    if table.separator or any(len(line.split()) != count for line in lines):
+    text, count = "\n".join([*islice(table.lines(), table.head, None), ""]), len(table.names)
+    data = text.encode()
+    if table.separator or data.translate(None, _PLAIN):
         return None
-    text = "\n".join(lines)
-    if text.encode().translate(None, _PLAIN):
+    gap = np.frombuffer(b" " + data, dtype=np.uint8) <= ord(" ")
+    begins, lines = np.flatnonzero(gap[:-1] & ~gap[1:]), np.flatnonzero(gap[1:])
+    ends = lines[np.frombuffer(data, dtype=np.uint8)[lines] == ord("\n")]
+    if (np.diff(np.searchsorted(begins, ends), prepend=0) != count).any():
         return None
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)  # of what is no number
         with suppress(DeprecationWarning, ValueError):
             found = np.fromstring(text, dtype=np.longdouble, sep=" ")
-            if found.size == len(lines) * count and np.isfinite(found).all():
+            if found.size == len(ends) * count and np.isfinite(found).all():
                 return found.reshape(-1, count)
     return None
 
@@ -150,13 +153,11 @@ def _of_format(text: str, format: str) -> TextTable:
     names = FORMATS[format].split(", ")
     place = names.index("eccentricity") if "eccentricity" in names else names.index("k")
 
-    def lines() -> list[str]:
-        return text.replace("D", "E").replace(",", " ").splitlines()
-
-    for number, line in enumerate(lines()):
+    lines = text.replace("D", "E").replace(",", " ").splitlines()
+    for number, line in enumerate(lines):
         cells = list(map(as_number, line.split()))
         if len(cells) == len(names) and abs(cells[place]) < 1:
-            return TextTable(lines, names, "", number)
+            return TextTable(lambda: lines, names, "", number)
     raise TableError(f'has no line of {len(names)} numbers, as format = "{format}" has: {FORMATS[format]}')
 
 
