@@ -19,6 +19,7 @@ from typing import Any
 import rigidsim
 from docs.builder import scenes
 from docs.builder.sections import CONFIGS, ROOT
+from rigidsim.look.signals import is_averaged
 
 PAGE = ROOT / "docs" / "gallery.md"
 PICTURES = ROOT / "docs" / "figures" / "gallery"
@@ -39,8 +40,9 @@ def numbers(run: rigidsim.Run, config: Path) -> list[str]:
     summary = run.summary
     error = summary["accuracy"]["estimated_attitude_error"]
     uncertain = "no attitude" if error is None else f"{error:.1e}"
-    if (averaged := run.dataset.attrs.get("modelling_error")) is not None:
-        uncertain = f"axes {averaged:.1e} (model)"
+    if is_averaged(run.dataset.attrs):
+        averaged = run.dataset.attrs.get("modelling_error")
+        uncertain = "axes not estimated" if averaged is None else f"axes {averaged:.1e} (model)"
     return [
         f"[{config.stem}](../{config.relative_to(ROOT).as_posix()})",
         str(summary["cost"]["steps"]),
