@@ -3,53 +3,13 @@
 import math
 from collections.abc import Callable
 
-import mpmath
 import numpy as np
 import pytest
-from support import CONFIGS, EPSILON, angle_between, law, run_text
+from support import EPSILON, run_text
 
 import rigidsim
-from rigidsim.solve.problem import prepare
 
 Ready = Callable[..., rigidsim.Run]
-BY_NAME = {path.stem: path for path in CONFIGS}
-
-
-def test_symmetric_top_follows_its_closed_form(ready: Ready) -> None:
-    """R(t) = exp(t [L/A]x) R0 exp(t (A-C)/A w3 [z]x): Landau & Lifshitz, Mechanics, section 33."""
-    run = ready("free_symmetric_top", "time.samples=51")
-    prepared = prepare(rigidsim.load(BY_NAME["free_symmetric_top"]))
-    scene = prepared.scene
-    a, c = mpmath.mpf(2), mpmath.mpf(3)
-    with mpmath.workdps(40):
-        q0 = [mpmath.mpf(x) for x in scene.quaternion]
-        w = [mpmath.mpf(x) for x in scene.angular_velocity]
-        momentum = rotate(q0, [a * w[0], a * w[1], c * w[2]])
-        size = mpmath.sqrt(sum(x * x for x in momentum))
-        exact = []
-        for t in run.dataset["time"].values:
-            half = size / a * mpmath.mpf(float(t)) / 2
-            left = [mpmath.cos(half)] + [mpmath.sin(half) * x / size for x in momentum]
-            turn = (a - c) / a * w[2] * mpmath.mpf(float(t)) / 2
-            right = [mpmath.cos(turn), 0, 0, mpmath.sin(turn)]
-            exact.append([float(x) for x in multiply(multiply(left, q0), right)])
-    error = angle_between(run.dataset["quaternion"].values, np.array(exact))
-    bound = 3 * law(EPSILON["double"], run.summary["cost"]["steps"], math.sqrt(1.16), 200)
-    assert error.max() <= bound
-
-
-def multiply(p: list, q: list) -> list:
-    return [
-        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
-        p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
-        p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1],
-        p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0],
-    ]
-
-
-def rotate(q: list, v: list) -> list:
-    conjugate = [q[0], -q[1], -q[2], -q[3]]
-    return multiply(multiply(q, [0, *v]), conjugate)[1:]
 
 
 def tilt(run: rigidsim.Run) -> np.ndarray:

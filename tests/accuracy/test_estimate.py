@@ -61,6 +61,8 @@ def test_a_run_whose_every_step_is_followed_says_so() -> None:
     assert true <= COVERED * accuracy["estimated_attitude_error"] <= COVERED * HONEST * true
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_errors_grow_in_a_passage_that_no_beginning_shows() -> None:
     """Near the middle axis, which is left after 500 s: announced at 1.8e-10, 3.7e-7 off."""
     run = run_text(PASSAGES)
@@ -120,6 +122,8 @@ def test_a_loose_tolerance_is_estimated_by_what_it_cuts_off() -> None:
     ['formulation = "canonical"\ntolerance = 1e-10', 'formulation = "euler_angles"\nprecision = "single"'],
     ids=["momenta", "single"],
 )
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_coarse_runs_are_held_against_tighter_ones(integrator: str) -> None:
     """By at most 3 times what is true at the samples; canonical ones were announced 840 times too wrong."""
     text = config(loads=GRADIENT, time="end = 100\nsamples = 2", integrator=integrator)
@@ -142,6 +146,8 @@ def test_estimates_can_be_turned_off_and_change_no_bit() -> None:
         assert all(one[name].values.tobytes() == other[name].values.tobytes() for name in one.data_vars)
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_kinks_and_jumps_are_followed() -> None:
     """Neighbours come to switching surfaces at other times than the motion."""
     drag = 'kind = "torque"\ncomponents = ["-0.2*abs(wx)*wx", "-0.1*sign(wy)", "0.05*abs(wz)"]'

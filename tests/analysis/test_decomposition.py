@@ -114,7 +114,7 @@ def test_errors_are_those_of_noise() -> None:
     n = np.arange(count) - (count - 1) / 2
     clean = np.exp(2j * np.pi * 0.123456 * n) + 0.2 * np.exp(-2j * np.pi * 0.31 * n)
     pulls: list[tuple[float, float]] = []
-    for _ in range(20):
+    for _ in range(10):
         noise = 0.01 * (rng.standard_normal(count) + 1j * rng.standard_normal(count))
         values: Any = clean + noise
         found = decompose(SignalSamples(((values.real, values.imag),), False, 53, CONTEXT), 5, -1, 1e-12)
@@ -172,7 +172,7 @@ def test_lines_near_some_that_merge_are_found() -> None:
     """Four lines within 1.3 bins, as of the Earth's obliquity in a million years, hide no others."""
     rng, count, found = np.random.default_rng(1), 400, 0
     x = np.arange(count) - (count - 1) / 2
-    for _ in range(12):
+    for _ in range(4):
         base = rng.uniform(20, 30)
         apart = base + np.array([rng.uniform(8, 12), -rng.uniform(5.5, 9), rng.uniform(20, 30)])
         bins = np.concatenate([base + np.array([0, 0.42, 0.85, -0.42]), apart])
@@ -182,4 +182,4 @@ def test_lines_near_some_that_merge_are_found() -> None:
         made = decompose(SignalSamples(((values, 0 * values),), True, 53, CONTEXT, None), 10, -1, 1e-3)
         got = np.array([float(f) * count for f in made.sum.frequencies])
         found += sum(np.abs(got - line).min() < 0.5 for line in apart)
-    assert found >= 32, f"{found} of 36 lines"
+    assert found >= 11, f"{found} of 12 lines"

@@ -39,6 +39,7 @@ def test_broken_promises_are_found() -> None:
 
 
 @pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.slow
 def test_random_scenes_go_forth_and_back_within_ten_times_what_both_ways_announce(seed: int) -> None:
     """In any precision, half of them into the past first; what is damped forwards may run away backwards."""
     found = judge_reversal(coverage_scene(seed, seed=2))

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import pytest
 import test_a_solver  # noqa: F401  (which registers a solver)
-from killing import killed
 from support import cases, config, loaded, run_text, same_bits
 
 import rigidsim
@@ -107,26 +106,12 @@ def test_the_motion_is_that_of_the_impulses(case: tuple[str, int]) -> None:
     assert wrong.max() < bound
 
 
-@pytest.mark.optimised  # as in the process that is killed
-@pytest.mark.parametrize("method", cases(METHODS, []))
-def test_a_killed_run_resumes_bit_for_bit(method: str, tmp_path: Path) -> None:
-    given = text(method, 25, 6.0).replace("estimate = false", "estimate = true")
-    whole = run_text(given, estimate=True)
-    done = rigidsim.resume(killed("test_an_effect", given, tmp_path))
-    assert done.summary["cost"]["sessions"] == 2
-    same_bits(whole, done)
-    for name in ("steps", "smallest_step", "largest_step"):
-        assert done.summary["cost"][name] == whole.summary["cost"][name]
-    announced = [run.summary["accuracy"]["estimated_attitude_error"] for run in (whole, done)]
-    assert announced[0] == announced[1]
-    assert rigidsim.verify(done.folder.path).identical
-
-
 def test_it_is_missed_where_it_is_not_registered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    limited = text("taylor") + "[limits]\nmax_steps = 9\n"
-    run = run_text(limited, out=tmp_path)
+    """And resumed bit for bit where it is."""
+    run = run_text(text("taylor") + "[limits]\nmax_steps = 9\n", out=tmp_path)
     monkeypatch.setattr(Impulses, "of", lambda *_: None)
     with pytest.raises(rigidsim.RunFolderError, match='saved with "impulses", which is missing here'):
         rigidsim.resume(run.folder.path)
     monkeypatch.undo()
-    assert rigidsim.resume(run.folder.path, overrides=["limits.max_steps=100000"]).status == "finished"
+    resumed = rigidsim.resume(run.folder.path, overrides=["limits.max_steps=100000"])
+    same_bits(run_text(text("taylor")), resumed)

@@ -51,6 +51,8 @@ def made(span: float, every: float, turned: Rotation | None = None) -> tuple[xar
 
 
 @pytest.mark.parametrize("days", [5])
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_known_librations_are_found(days: int) -> None:
     """In other body axes than the principal ones for samples that are farther apart."""
     other = Rotation.from_euler("XYZ", [0.3, -0.4, 0.5]) if days > 1 else None

@@ -100,26 +100,3 @@ def _write_empty(dataset: rigidsim.Run, path: Path) -> None:
         ]
         bare = replace(drawn, picture=replace(drawn.picture, stages=stages))
         bare.draw(recording)
-
-
-@pytest.mark.slow
-def test_the_viewer_turns_the_body_as_the_dataset_says(tmp_path: Path, ready: Ready) -> None:
-    with ready("intermediate_axis").dataset as dataset:
-        write_timeline(dataset, tmp_path / "t.rrd")
-        quaternion = dataset["quaternion"].values
-        seconds = dataset["time"].values
-    from rigidsim.look.solids import rotation_matrix
-
-    viewer = opened(tmp_path / "t.rrd")
-    try:
-        assert (viewer.start, viewer.end) == (0, round(seconds[-1] * 1e9))
-        for row in (0, 1, 777, 6000, 12000):
-            viewer.seek_tick(round(seconds[row] * 1e9))
-            time.sleep(0.3)
-            graph = viewer.client.get_transform_graph(include_transforms=True, edge_filter="temporal")
-            edge = next(e for e in graph["edges"] if e["child"] == "tf#/scene/body")
-            shown = np.array(edge["source"]["parent_from_child"])[:3, :3]
-            # float32 quaternions: half a unit in the last place, twice in each entry
-            np.testing.assert_allclose(shown, rotation_matrix(quaternion[row]), rtol=0, atol=1e-6)
-    finally:
-        viewer.__exit__()

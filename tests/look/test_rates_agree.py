@@ -34,7 +34,7 @@ def texts(dataset: object, what: str) -> str:
 
 FOLDERS = [CONFIGS[0].parent / one for one in ("", "bodies", "tables")]
 SCENES = [path for folder in FOLDERS for path in sorted(folder.glob("*.toml"))]
-USUAL = [path for path in SCENES if path.stem in ("heavy_top_nutating", "earth_free_nutation")]
+USUAL = [path for path in SCENES if path.stem == "earth_free_nutation"]
 ONCE = re.compile(r"once\s+(?:round\s+)?in\s+((?:about )?[\d.]+ \w+)")
 RATES = {"precession": "precession_angle", "figure axis precesses in": "node_longitude.figure"}
 TURN = 2 * np.pi

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from support import config, run_text
 
 AU, SUN, EARTH, MOON = 149597870700.0, 1.32712440018e20, 3.986004418e14, 4.9028e12
@@ -47,6 +48,8 @@ def nodding() -> float:
     return drive / spin
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_the_momentum_is_that_of_every_rotation_as_announced() -> None:
     full, averaged = run_text(scene("full")), run_text(scene("spin_averaged"), estimate=True)
     moved = full.dataset.momentum_axis.values

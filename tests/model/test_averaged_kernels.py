@@ -1,6 +1,7 @@
 """Averages over the rotation under bodies of a kernel, and under tables: both set states where steps end."""
 
 import numpy as np
+import pytest
 from support import config, run_text
 
 EARTH = config(
@@ -13,6 +14,8 @@ EARTH = config(
 )
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_both_announced_errors_are_true() -> None:
     """That of the model beside every rotation, that of the integration beside 80 bits."""
     averaged = run_text(EARTH, estimate=True)

@@ -37,6 +37,8 @@ def prepared(
 # --- means over a polhode ---------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_a_viscous_torque_averages_to_the_same_by_closed_means_and_by_nodes() -> None:
     for rates in (RATES, [0.1, 1.5, 0.2]):
         closed, summed = (prepared(loads, rates=rates).system for loads in (VISCOUS, AS_FORMULAS))

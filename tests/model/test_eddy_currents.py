@@ -39,7 +39,9 @@ def start_of(inertia: np.ndarray, w: np.ndarray, q: np.ndarray) -> np.ndarray:
     return np.concatenate([r @ (inertia * w), r.ravel()])
 
 
-@pytest.mark.parametrize(("precision", "error"), [("double", 1e-12), ("extended", 1e-15)])
+@pytest.mark.parametrize(
+    ("precision", "error"), [("double", 1e-12), pytest.param("extended", 1e-15, marks=pytest.mark.slow)]
+)
 def test_a_spin_across_the_field_falls_exponentially(precision: str, error: float) -> None:
     """A LAGEOS-like sphere: rate exp(-t / T) with T = I / k B^2, for a solid one and for a shell."""
     for wall, of_wall in (("", 0.0), ('thickness = "1 cm"\n', 0.29)):

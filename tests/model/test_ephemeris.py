@@ -42,6 +42,8 @@ def test_the_sun_and_the_moon_at_j2000() -> None:
     assert distance == pytest.approx(402_449e3, abs=5e3)
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_the_sun_comes_round_in_a_sidereal_year_and_the_moon_in_a_sidereal_month() -> None:
     begin, end = at("sun", 0.0)[0], at("sun", 86400 * 365.256363)[0]
     assert abs(end - begin) < 0.02  # perturbations of the Earth's place by the Moon: some 10 arcsec

@@ -21,23 +21,6 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return path.read_bytes()
 
 
-@pytest.mark.slow
-def test_a_file_by_hand_places_bodies_as_the_package_does(tmp_path: Path, whole: bytes) -> None:
-    """The file has the Moon about the barycentre with the Earth, the package about the Earth."""
-    path = tmp_path / "moon.bsp"
-    path.write_bytes(whole)
-    found = run_text(moon(str(path), STRENGTHS)).dataset
-    package = run_text(moon("de421", STRENGTHS)).dataset
-    for source in ("earth", "sun"):
-        one, other = (x["source_position"].sel(source=source).values for x in (found, package))
-        size = np.linalg.norm(one, axis=1)
-        # the file's own factors of the Moon's place are rounded
-        assert (np.linalg.norm(one - other, axis=1) / size).max() < 1e-15
-    np.testing.assert_allclose(found["quaternion"].values, package["quaternion"].values, atol=1e-13)
-    assert found.attrs["ephemeris_kernel"] == "moon.bsp"
-    assert found.attrs["ephemeris_span"] == "1969-05-27 to 1970-02-07 TDB"
-
-
 def flipped(at: int, bit: int = 0x40) -> Callable[[bytes], bytes]:
     """One bit of a byte, counted from the end where negative, is another."""
 

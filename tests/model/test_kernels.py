@@ -65,6 +65,8 @@ def test_positions_are_those_of_jplephem() -> None:
 
 
 @pytest.mark.parametrize(("precision", "bound"), [("quadruple", 1e-32)])
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_positions_are_the_kernels_polynomials(precision: str, bound: float) -> None:
     # at an edge both blocks hold, which the fit has made continuous to 1e-15 alone
     times = [t for t in at_random(6, 20) if t < 20 * 86400 and (t / 86400 - 1.5) % 4]

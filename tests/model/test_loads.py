@@ -6,32 +6,8 @@ import heyoka as hy
 import numpy as np
 import pytest
 from equations import CLOSE, EPS, Random, array, derivative, general_body, matrix, prepared
-from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from support import config, run_text
-
-
-def gradient(strength: float, orbit: dict[str, float]) -> str:
-    elements = ", ".join(f"{k} = {v!r}" for k, v in orbit.items())
-    return f'kind = "gravity_gradient"\ngravitational_parameter = {strength!r}\norbit = {{{elements}}}'
-
-
-def source_at(orbit: dict[str, float], strength: float, time: float) -> np.ndarray:
-    """Position of the attracting body (m, space axes); Kepler's equation by bisection, not by Newton."""
-    a, e = orbit["semi_major_axis"], orbit.get("eccentricity", 0.0)
-    motion = 2 * np.pi / orbit["period"] if "period" in orbit else np.sqrt(strength / a**3)
-    mean = orbit.get("mean_anomaly", 0.0) + motion * time
-    anomaly = brentq(lambda x: x - e * np.sin(x) - mean, mean - 1, mean + 1, xtol=1e-15, rtol=4 * EPS)
-    flat = a * np.array([np.cos(anomaly) - e, np.sqrt(1 - e * e) * np.sin(anomaly), 0])
-    node = orbit.get("ascending_node", 0.0) + orbit.get("node_rate", 0.0) * time
-    periapsis = orbit.get("periapsis", 0.0) + orbit.get("periapsis_rate", 0.0) * time
-    return Rotation.from_euler("ZXZ", [node, orbit.get("inclination", 0.0), periapsis]).apply(flat)
-
-
-def gradient_torque(tensor: np.ndarray, r: np.ndarray, position: np.ndarray, strength: float) -> np.ndarray:
-    """(3 G M / R^5) rho x I rho, rho = R^T position (MacCullagh), body axes."""
-    rho = r.T @ position
-    return 3 * strength / np.linalg.norm(rho) ** 5 * np.cross(rho, tensor @ rho)
 
 
 def turning(tensor: np.ndarray, w: np.ndarray, torque: np.ndarray) -> np.ndarray:
@@ -50,51 +26,6 @@ def travel(system: Any, times: list[float]) -> np.ndarray:
         integrator.propagate_until(float(np.ldexp(time, -unit)))
         rows.append(integrator.state.copy())
     return np.ldexp(np.array(rows), np.array(system.state_exponents))
-
-
-def quaternions(system: Any, states: np.ndarray) -> np.ndarray:
-    """Attitudes in space, shape (times, 4)."""
-    return states[:, 3:7]
-
-
-@pytest.mark.parametrize("shape", ["circular", "eccentric", "moving", "period"])
-def test_gradient_torque_of_a_body_on_an_orbit(shape: str) -> None:
-    """Along the motion, from a start that isn't zero, the torque is that of an independent Kepler orbit."""
-    random = Random(1000)
-    uniform = random.generator.uniform
-    strength = float(uniform(0.5, 2))
-    orbit = {"semi_major_axis": float(uniform(0.8, 1.5)), "mean_anomaly": float(uniform(-3, 3))}
-    orbit |= {"inclination": float(uniform(0, 3)), "ascending_node": float(uniform(-3, 3))}
-    if shape != "circular":
-        orbit |= {"eccentricity": float(uniform(0.05, 0.7)), "periapsis": float(uniform(-3, 3))}
-    if shape == "moving":
-        orbit |= {"node_rate": float(uniform(-0.3, 0.3)), "periapsis_rate": float(uniform(-0.3, 0.3))}
-    if shape == "period":
-        orbit |= {"period": float(uniform(3, 9))}
-    tensor = random.tensor()
-    start = float(uniform(-20, 20))
-    system = prepared(
-        general_body(tensor),
-        f"angular_velocity = {array(random.vector())}\nquaternion = {array(random.quaternion())}",
-        gradient(strength, orbit),
-        start=start,
-        end=start + 10,
-    ).system
-    times = [start, *np.sort(start + uniform(0, 10, 6))]
-    states = travel(system, times)
-    for time, state, q in zip(times, states, quaternions(system, states), strict=True):
-        position = source_at(orbit, strength, time)
-        torque = gradient_torque(tensor, matrix(q), position, strength)
-        expected = turning(tensor, state[:3], torque)
-        size = np.linalg.norm(np.linalg.inv(tensor)) * np.linalg.norm(tensor)
-        nearest = orbit["semi_major_axis"] * (1 - orbit.get("eccentricity", 0.0))
-        size *= state[:3] @ state[:3] + 3 * strength / nearest**3
-        # some 200 steps' roundings in the orbit's phase, and those of M + n t near 30 rad, which the
-        # orbital rate at pericentre amplifies by up to (1 - e)^-2
-        phase = 30 * EPS / (1 - orbit.get("eccentricity", 0.0)) ** 2
-        np.testing.assert_allclose(
-            derivative(system, state, time)[:3], expected, rtol=0, atol=20 * size * phase
-        )
 
 
 def test_rates_are_bounded_by_what_the_gradient_of_a_nearly_round_body_can_give() -> None:

@@ -71,6 +71,8 @@ IN_FLIGHT = Flight(
 AROUND = 'orbit = {semi_major_axis = "7000 km"}\ngravitational_parameter = 3.986004418e14'
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_in_flight_the_field_is_that_at_the_body() -> None:
     """The other integrator's own errors: 1e-13 of each of some hundred steps, which the motion amplifies."""
     run, truth = run_text(IN_FLIGHT.text), by_scipy(IN_FLIGHT)[6:10]

@@ -80,6 +80,8 @@ def test_a_law_that_reads_a_limited_state_switches_in_its_derivative() -> None:
     np.testing.assert_allclose(data["gone_time"].values, [2 + np.log(2)], rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_a_run_with_a_state_that_grows_is_prolonged_bit_for_bit(tmp_path: Path) -> None:
     """Its unit doesn't depend on the end."""
     more = state("grows", "1e6 + wx", 0, "rad") + state("held", "sin(t)")

@@ -257,7 +257,7 @@ def test_nonsense_is_refused(changes: list[str], message: str) -> None:
         run_text(scene(FREE, FIXED, end=5), *changes)
 
 
-@pytest.mark.parametrize("seed", seeds(3, 30))
+@pytest.mark.parametrize("seed", seeds(1, 30))
 def test_a_control_moment_gyro_exchanges_momentum_with_the_body(seed: int) -> None:
     """Against DOP853; the momentum in space stays, and the energy is the work of the gimbal."""
     rng = np.random.default_rng(seed)

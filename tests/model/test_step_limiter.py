@@ -34,7 +34,7 @@ def spun(torque: str, runs: Path, *, width: str = "1", spin: str = "0.5", precis
 @pytest.mark.parametrize(
     ("form", "precision", "width"),
     [
-        ("exp(-((t-50)/w)^2)/w", "extended", "1e-2"),
+        pytest.param("exp(-((t-50)/w)^2)/w", "extended", "1e-2", marks=pytest.mark.slow),
         ("sigmoid((t-50)/w)*sigmoid((50-t)/w)/w", "double", "1e-4"),
     ],
 )
@@ -95,9 +95,11 @@ def test_an_event_on_a_narrow_function_of_time(runs: Path) -> None:
     ("speed", "record", "carried"),
     [
         ("7668.6", "", {"work"}),  # a circle at 400 km
-        ("7668.6", 'record = ["quaternion"]', set()),
+        pytest.param("7668.6", 'record = ["quaternion"]', set(), marks=pytest.mark.slow),
         ("8500", 'record = ["quaternion"]', {"pace"}),  # it rises by 4,600 km
-        ("7668.6", 'record = ["quaternion"]\n[limits]\nmax_drift = 1e-3', {"work"}),
+        pytest.param(
+            "7668.6", 'record = ["quaternion"]\n[limits]\nmax_drift = 1e-3', {"work"}, marks=pytest.mark.slow
+        ),
     ],
 )
 def test_orbits_through_air_carry_what_they_need(speed: str, record: str, carried: set[str]) -> None:

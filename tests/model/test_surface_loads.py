@@ -91,6 +91,8 @@ def pushed(on: Any, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return sum(f for _, f in forces), sum(np.cross(x, f) for x, f in forces)
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_light_and_air_on_plates_boxes_and_spheres() -> None:
     """In flight through rotating air, at twenty attitudes: what the loads add to the equations."""
     random = Random(8)

@@ -58,6 +58,8 @@ PLANET = config(
 
 
 @pytest.mark.parametrize("seed", seeds(1, 50))
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_the_free_nutation_of_random_planets(seed: int) -> None:
     """Sampled every few days, it is labelled and unfolded."""
     rng = np.random.default_rng([1, seed])

@@ -32,6 +32,8 @@ KEYS = [
 
 
 @pytest.mark.parametrize("seed", seeds(1, 50))
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_members_beyond_the_range_of_a_key_are_refused(seed: int, tmp_path: Path) -> None:
     chance = random.Random(seed)
     key, allowed, ends = chance.choice(KEYS)

@@ -84,7 +84,7 @@ def test_a_fit_reads_any_style(seed: int, tmp_path: Path) -> None:
     rate = {"x": 0 * times, "y": 0 * times, "z": RATE + 1e-4 * np.cos(times)}
     text = table(chance, tmp_path / "seen.csv", rate, times)
     (tmp_path / "config.toml").write_text(SPIN + FIT)
-    found = rigidsim.fit(tmp_path / "config.toml", out=tmp_path / "fit")
+    found = rigidsim.fit(tmp_path / "config.toml")
     assert found.parameters[0].value == pytest.approx(np.mean(rate["z"]), abs=1e-9), text
 
 

@@ -30,6 +30,8 @@ def damage(path: Path, draw: random.Random) -> None:
 
 
 @pytest.mark.parametrize("seed", seeds(1, 25))
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_the_advice_about_a_damaged_dataset_leads_on(
     seed: int, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -133,6 +133,8 @@ def _quickly_compiled() -> Iterator[None]:
 
 
 @pytest.mark.parametrize("seed", seeds(1, 60))
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_spectra(seed: int) -> None:
     end, drawn = 20.0, Drawn.of(seed)
     text = drawn.text(end, lyapunov=True)

@@ -17,7 +17,7 @@ from rigidsim.scene.parts_of_values import parts_in
 PRECISIONS = {'"extended"': 2.0**-63, '"quadruple"': 2.0**-112, "40": 1e-40}
 
 
-@pytest.mark.parametrize("seed", seeds(3, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_random_torques_at_rest(seed: int) -> None:
     """Each of the angle from a steady turn, pushed off a place by k and held beyond by a cube, and damped."""
     rng = np.random.default_rng(seed)

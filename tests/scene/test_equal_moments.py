@@ -42,7 +42,7 @@ def test_the_axis_of_the_fault_is_refused_and_by_default_that_of_symmetry() -> N
 
 def test_turned_symmetric_bodies_are_symmetric() -> None:
     random = np.random.default_rng(25)
-    for _ in range(60):
+    for _ in range(20):
         pair, single = random.uniform(0.6, 1.0, 2)
         size = 10 ** random.uniform(-6, 38)
         body, axes = turned([pair * size, pair * size, single * size], random)

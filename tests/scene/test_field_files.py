@@ -96,8 +96,15 @@ def final(experiment: rigidsim.Experiment) -> np.ndarray:
 
 @pytest.mark.parametrize(
     "field",
-    [gfc("errors formal", mark="D"), gfc("norm unnormalized"), tab(), tab(0)],
-    ids=["gfc", "unnormalized", "tab", "tab unnormalized"],
+    [
+        pytest.param(field, id=name, marks=[pytest.mark.slow] * late)
+        for late, name, field in (
+            (0, "gfc", gfc("errors formal", mark="D")),
+            (1, "unnormalized", gfc("norm unnormalized")),
+            (1, "tab", tab()),
+            (0, "tab unnormalized", tab(0)),
+        )
+    ],
 )
 def test_a_file_is_the_field_that_it_lists(tmp_path: Path, field: str) -> None:
     found, expected = final(saved(tmp_path, field)), final(rigidsim.parse(text(listed())))

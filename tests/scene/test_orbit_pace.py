@@ -1,6 +1,5 @@
 """An orbit's pace: by its anomalistic period, its sidereal period, or the rate of its longitude."""
 
-import math
 import random
 from typing import Any
 
@@ -50,24 +49,6 @@ def test_64_random_paces_are_exact() -> None:
             assert abs(found - (longitude - drift)) < mpmath.mpf(10) ** -55 * longitude
             anomalistic = mpmath.mpf(orbit_of(rates + f'period = "{period}e-11 day"').mean_motion)
             assert abs(anomalistic - by_period[1]) < mpmath.mpf(10) ** -55 * anomalistic
-
-
-@pytest.mark.parametrize(
-    "elements", ["eccentricity = 0.2, inclination = 0.3", "eccentricity = 0, inclination = 0"]
-)
-def test_the_mean_longitude_returns_after_the_sidereal_period(elements: str) -> None:
-    """Node, periapsis and anomaly together, however a circle's or an untilted orbit's are carried."""
-    rates = (
-        "ascending_node = 0.4, periapsis = 1.1, mean_anomaly = 0.7, node_rate = -0.003, periapsis_rate = 0.01"
-    )
-    text = SCENE.format(
-        precision="double", orbit=f"semi_major_axis = 1, {elements}, {rates}, sidereal_period = 5"
-    )
-    (load,) = build_scene(parse(text)).loads
-    orbit = load.orbit  # type: ignore[attr-defined]
-    longitude = orbit.mean_motion + orbit.periapsis_rate + orbit.node_rate
-    assert abs(float(longitude) - 2 * math.pi / 5) < 1e-15
-    assert abs(float(orbit.mean_anomaly + orbit.periapsis + orbit.ascending_node) - 2.2) < 1e-15
 
 
 def test_a_table_takes_them_for_its_mean_longitude() -> None:

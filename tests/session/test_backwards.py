@@ -22,7 +22,7 @@ DRIVEN = (
 
 @pytest.mark.parametrize(
     "formulation",
-    cases(["quaternion", "rotation_matrix", "euler_angles", "closed_form"], ["euler_angles", "closed_form"]),
+    cases(["quaternion", "rotation_matrix", "euler_angles", "closed_form"], ["closed_form"]),
 )
 def test_the_same_motion_is_found_from_its_other_end(formulation: str) -> None:
     """Forwards from the state at -3 s in 80 bits, and backwards from the state at 0 in double precision."""
@@ -89,13 +89,14 @@ def test_events_dates_and_lines_are_those_of_the_motion_forwards(tmp_path: Path)
     np.testing.assert_allclose(days, -np.arange(401) * 0.1 / 86400, rtol=0, atol=1e-9)
     (signal,) = rigidsim.analyse(back, ["angular_velocity.x+iy"]).signals
     assert abs(float(signal.lines[0].frequency)) == pytest.approx(1.0, rel=1e-12)
-    assert back.plot() is not None
     verdict = rigidsim.verify(tmp_path / "scene", reversed=True)
     assert verdict.identical
     assert verdict.reversal.attitude <= verdict.reversal.announced
     assert "returns to its start" in verdict.as_dict()["reversal"]["words"]
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_members_go_either_way(tmp_path: Path) -> None:
     swept = config(loads=DRIVEN[1]) + '[sweep]\nkeep = ["final"]\naxes."time.end" = {values = [-2, 1]}\n'
     members = rigidsim.sweep(rigidsim.parse(swept), out=tmp_path).dataset

@@ -78,6 +78,8 @@ def test_max_drift_ends_with_the_first_sample_past_it(tmp_path: Path) -> None:
     same_bits(done, complete)
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_max_drift_looks_at_the_last_sample_too(tmp_path: Path) -> None:
     """Below a rounding no run keeps it; one that is short is over before guards are looked at again."""
     closed = 'method = "closed_form"'

@@ -49,27 +49,6 @@ method = "closed_form"
 """
 
 
-@pytest.mark.parametrize(
-    "precision", cases(["single", "double", "extended", "quadruple", "40"], ["double", "40"])
-)
-def test_it_agrees_with_the_integration_in_each_precision(precision: str) -> None:
-    given = precision if precision.isdigit() else f'"{precision}"'
-    wide = f"integrator.precision={given}"
-    one = run_text(FREE, wide, "time.end=10", 'name="c"')
-    two = run_text(FREE, wide, "time.end=10", 'name="t"', 'integrator.method="taylor"')
-    assert (one.summary["method"], one.dataset.attrs["method"]) == ("closed_form", "closed_form")
-    assert one.summary["cost"]["steps"] == 0
-    bits = {"single": 24, "double": 53, "extended": 64, "quadruple": 113}.get(precision, 134)
-    for name in ("quaternion", "angular_velocity"):
-        parts = [name, f"{name}_lo", f"{name}_lo2"]
-        with one.dataset as a, two.dataset as b:
-            difference = sum(a[p].values - b[p].values for p in parts if p in a)
-        # some 30 steps of a few roundings each, over 10 rad
-        assert np.abs(difference).max() < 2.0 ** (9 - bits)
-    for row in one.summary["invariants"].values():
-        assert row["largest_drift"] < 2.0 ** (5 - min(bits, 53))  # evaluated from the states: a few roundings
-
-
 def test_a_top_and_a_throw_in_closed_form() -> None:
     heavy = FREE.replace("principal_moments = [1, 2, 3]", top(1, 0.5)).replace(
         "[time]", '[[loads]]\nkind = "uniform_gravity"\nacceleration = [0, 0, -1]\n[time]'

@@ -6,7 +6,6 @@ import mpmath
 import numpy as np
 import pytest
 import xarray
-from scipy.integrate import solve_ivp
 
 import rigidsim
 from rigidsim import ConfigError
@@ -240,55 +239,6 @@ def test_a_planet_of_two_equal_moments_has_colombos_states(number: int) -> None:
     assert max(x.real for x in found) == pytest.approx(values.real.max(), rel=0.02, abs=1e-12)
     assert max(x.imag for x in found) == pytest.approx(values.imag.max(), rel=0.02, abs=1e-12)
     assert told.stable == (number != 4)
-
-
-@pytest.mark.slow
-def test_independent_equations_come_back_and_grow_alike() -> None:
-    """Angular momentum and rotation matrix in space axes, by scipy: the Moon's return and librations."""
-    scene = scene_of(MOON)
-    moments = np.array([float(x) for x in scene.body.principal_moments])
-    moments = moments / moments[2]
-    orbit = scene.loads[0].orbit  # type: ignore[attr-defined]
-    n, g, tilt = float(orbit.mean_motion), float(orbit.node_rate), float(orbit.inclination)
-    strength = 3 * 3.986004418e14 / 384400e3**3 / n**2
-    g /= n
-
-    def slope(t: float, y: np.ndarray) -> np.ndarray:
-        momentum, r = y[:3], y[3:].reshape(3, 3)
-        c, s = np.cos(g * t), np.sin(g * t)
-        x, across = np.cos(t), np.sin(t)
-        u = [c * x - s * np.cos(tilt) * across, s * x + c * np.cos(tilt) * across, np.sin(tilt) * across]
-        inertia = r @ np.diag(moments) @ r.T
-        w = np.linalg.solve(inertia, momentum)
-        spin = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-        return np.concatenate([strength * np.cross(u, inertia @ u), (spin @ r).ravel()])
-
-    r = matrix_of(np.array([float(x) for x in scene.quaternion]))
-    momentum = r @ (moments * np.array([float(x) for x in scene.angular_velocity])) / n
-    back = np.array(
-        [
-            [np.cos(g * 2 * np.pi), np.sin(g * 2 * np.pi), 0],
-            [-np.sin(g * 2 * np.pi), np.cos(g * 2 * np.pi), 0],
-            [0, 0, 1],
-        ]
-    )
-
-    def after(x: np.ndarray) -> np.ndarray:
-        """What a start apart by a rotation vector and momentum (space axes) becomes, in the node's frame."""
-        cross = np.array([[0, -x[2], x[1]], [x[2], 0, -x[0]], [-x[1], x[0], 0]])
-        small = np.eye(3) + cross + cross @ cross / 2
-        y = np.concatenate([momentum + x[3:], (small @ r).ravel()])
-        end = solve_ivp(slope, (0, 2 * np.pi), y, "DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
-        turn = back @ end[3:].reshape(3, 3) @ r.T
-        vector = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2
-        return np.concatenate([vector, back @ end[:3] - momentum])
-
-    np.testing.assert_allclose(after(np.zeros(6)), 0, atol=3e-12)
-    step = 1e-4
-    columns = [(after(step * e) - after(-step * e)) / (2 * step) for e in np.eye(6)]
-    values = np.log(np.linalg.eigvals(np.array(columns).T)) / (2 * np.pi) * n
-    expected = np.sort(values.imag[values.imag > 0])
-    np.testing.assert_allclose([i for _, i in scene.found_start.exponents], expected, rtol=2e-4)
 
 
 @pytest.mark.parametrize(

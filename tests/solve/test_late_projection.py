@@ -79,6 +79,8 @@ def as_by_an_earlier_version(checkpoint: Path) -> None:
     seal.seal(checkpoint)
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_samples_move_no_bit_across_the_count() -> None:
     """Whichever way steps are taken: skipped, in grids, in blocks, or one by one."""
     end = 4 * round(1.5 * LATE * STEP / 4)

@@ -33,6 +33,8 @@ def test_a_body_without_spin_is_seen_to_hit_the_ground(precision: str) -> None:
 
 
 @pytest.mark.parametrize(("precision", "formulation"), [("double", "euler_angles")])
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_a_kink_far_within_a_long_step_is_one_of_its_ends(precision: str, formulation: str) -> None:
     run = run_text(KINKED, f'integrator.precision="{precision}"', f'integrator.formulation="{formulation}"')
     # 3 w' = 3e-6 |t - 241|

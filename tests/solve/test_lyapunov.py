@@ -55,6 +55,8 @@ def test_a_free_body_is_regular() -> None:
     assert len(chaos["exponents"]) == len(run.summary["states"]) == 7
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_a_spectrum_that_was_interrupted_goes_on_with_the_same_bits(
     runs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -53,7 +53,7 @@ def test_a_smooth_spike_errs_by_rounding() -> None:
 PAIRS = list(product(["single", "double", "extended"], ["pulse", "spike"]))
 
 
-@pytest.mark.parametrize("case", cases(PAIRS, PAIRS[2:4]), ids="-".join)
+@pytest.mark.parametrize("case", cases(PAIRS, PAIRS[2:3]), ids="-".join)
 def test_narrow_beside_the_last_digit_of_the_time(case: tuple[str, str]) -> None:
     """A pulse also where one number of the precision can't tell its beginning from its end."""
     precision, kind = case
@@ -111,7 +111,7 @@ def test_pulses_beyond_two_numbers_are_refused_with_the_reason() -> None:
     assert "two numbers of double precision don't resolve its impulse" in summary["message"]
 
 
-@pytest.mark.parametrize("torque", ["exp(-((t - 700.3)/(2^-48))^2)/(2^-48)", "1/cosh(t - 700.3)^2"])
+@pytest.mark.parametrize("torque", ["exp(-((t - 700.3)/(2^-48))^2)/(2^-48)"])
 def test_spikes_that_stop_a_run_are_told_with_what_to_do(torque: str) -> None:
     summary = run_text(LATE.format(torque=torque, precision="double")).summary
     assert summary["status"] == "stopped: non-finite state"

@@ -63,7 +63,7 @@ BODIES = {"free": FREE, "lagrange": LAGRANGE, "kovalevskaya": KOVALEVSKAYA}
 
 @pytest.mark.parametrize(
     "case",
-    cases(product(BODIES, FORMULATIONS), [("kovalevskaya", "quaternion"), ("kovalevskaya", "euler_angles")]),
+    cases(product(BODIES, FORMULATIONS), [("kovalevskaya", "quaternion")]),
     ids="-".join,
 )
 def test_invariants_stay_within_rounding(case: tuple[str, str]) -> None:
@@ -93,6 +93,8 @@ def test_each_scene_holds_what_it_conserves(parts: Scene, names: set[str]) -> No
 
 
 @pytest.mark.parametrize("precision", cases(["single", "extended", "quadruple"], ["extended"]))
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_every_precision_is_held_in_the_next(precision: str) -> None:
     found = run(FREE, 20, f'hold_invariants = true\nprecision = "{precision}"')
     assert max(drifts(found).values()) < rounding(precision)

@@ -10,12 +10,10 @@ import mpmath
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from support import EPSILON, angles_between, cases, config
+from support import EPSILON, cases, config
 
 import rigidsim
 from rigidsim import ConfigError
-from rigidsim.accuracy.comparison import try_setting
-from rigidsim.accuracy.setting import Setting
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sample_block import SampleBlock
@@ -128,7 +126,7 @@ SIDES = [
 ]
 
 
-@pytest.mark.parametrize("case", cases(SIDES, SIDES[::2]))
+@pytest.mark.parametrize("case", cases(SIDES, SIDES[4:5], daily=2))
 def test_each_side_integrates_by_itself(case: tuple[str, float]) -> None:
     torque, rate = case
     progress, found = about_z(torque)
@@ -143,11 +141,6 @@ def test_each_side_integrates_by_itself(case: tuple[str, float]) -> None:
         (
             "-sign(wrap(psi - 1)) - 0.3*sign(wz)*(1 + 0.1*sign(wrap(psi - 1)))",
             "angular_velocity = [0, 0, 0.5]\n" + TILTED.split("\n")[1],
-            "almost no time",
-        ),
-        (
-            "-0.4*sign(psi) - 0.2*sign(wz)",
-            "euler_angles = [1, 1, 0.5]\nangular_velocity = [0, 0, 0.3]",
             "almost no time",
         ),
     ],
@@ -168,25 +161,6 @@ SCENES = {
     "rates": '"0.3*max(wx, wy)", "-0.1*sqrt(wy^2)*wy", "-0.5*min(wz, 0.3)"',
     "an angle of the state": '"0.3*atan2(wx, wy)", "0", "-0.1*step(sin(psi))"',
 }
-
-
-@pytest.mark.parametrize("scene", cases(SCENES, []))
-def test_all_formulations_agree(scene: str) -> None:
-    """Within 1e-11 rad of extended precision: the law gives some 1e-14 for 20 rad, and these motions amplify
-    errors up to a hundred times.
-    """
-    text = config(
-        "principal_moments = [1, 1.3, 2]",
-        TILTED,
-        f'kind = "torque"\ncomponents = [{SCENES[scene]}]',
-        "end = 10\nsamples = 3",
-    )
-    experiment = rigidsim.parse(text)
-    truth = try_setting(experiment, Setting("extended"), compact=True)
-    for formulation in ("quaternion", "euler_angles", "rotation_matrix"):
-        found = try_setting(experiment, Setting("double", formulation=formulation), compact=True)
-        assert found.status is Status.FINISHED
-        assert angles_between(truth.attitudes, found.attitudes).max() < 1e-11
 
 
 @pytest.mark.parametrize(

@@ -41,6 +41,8 @@ def test_a_body_turns_ten_thousand_radians_between_two_samples(integrator: str) 
     assert "angles_wrapped_from" not in run.dataset.attrs
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_a_tumbling_body_that_passes_poles_has_the_angles_that_states_have() -> None:
     """Within 0.02 rad of the pole at 400.4 s the nearest angles of dense samples are a turn off, too. To
     record angles changes no bit of the motion.
@@ -67,6 +69,8 @@ def test_angles_at_events_are_within_one_turn_and_say_so() -> None:
     assert np.abs(found.values).max() <= np.pi
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_turns_of_a_motion_with_switching_surfaces() -> None:
     """Coulomb friction brings the body to rest after 40 turns; a switched torque turns it back and forth."""
     body, start = SYMMETRIC, "angular_velocity = [0, 0, 10]\neuler_angles = [0.2, 1, 0]"

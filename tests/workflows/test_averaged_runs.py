@@ -80,6 +80,8 @@ def test_the_announced_error_covers_the_true_one(full: rigidsim.Run) -> None:
     [("orbit_averaged", 3.0, [1, 1, 2]), ("spin_averaged", 0.9624, [1, 1, 1.05])],
     ids=["precessing as fast as the source goes round", "with a source as fast as the free precession"],
 )
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_an_average_that_fails_within_an_orbit_is_found_by_measurement(
     level: str, spin: float, moments: list[float]
 ) -> None:

@@ -97,6 +97,8 @@ def test_a_file_is_read_as_a_run(tmp_path: Path) -> None:
         _ = open_any(path).dataset
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_the_missing_acceleration_is_told(experiment: rigidsim.Experiment) -> None:
     """What brakes the experiment's body and not theirs: at rows of unequal distances, and with rates."""
     braked = experiment.having(['loads=[{kind="viscous_torque",coefficients=[0.001,0.001,0.001]}]'])
@@ -118,7 +120,7 @@ SEQUENCES = ["zxz", "zyz", "xyx", "xzx", "yxy", "yzy", "zyx", "xyz", "xzy", "yxz
 TRAJECTORY = theirs(1e-13, rows=61)
 
 
-@settings(deadline=None, max_examples=6, suppress_health_check=[HealthCheck.too_slow])
+@settings(deadline=None, max_examples=3, suppress_health_check=[HealthCheck.too_slow])
 @given(
     sequence=st.sampled_from(["", *SEQUENCES]), fixed=st.booleans(), inverse=st.booleans(),
     last=st.booleans(), degrees=st.booleans(), space=st.booleans(),

@@ -16,7 +16,6 @@ import rigidsim
 from rigidsim.errors import ConfigError, RigidsimError, RunFolderError
 from rigidsim.workflows.fit import fitting
 from rigidsim.workflows.fit.estimation import inverse_right_jacobian
-from rigidsim.workflows.fit.observations import ByDifferences
 
 SPIN = 0.7  # rad/s about z
 SIGMA = 0.01  # rad
@@ -154,43 +153,7 @@ def test_residuals_of_attitudes_turn_as_the_logarithm_does() -> None:
     np.testing.assert_allclose(inverse_right_jacobian(vectors) @ turn, slopes, atol=2e-9)
 
 
-def seen_free(folder: Path) -> None:
-    """Rates, their kinetic energy and a direction of a free body, with noise of 1e-3."""
-    noise = np.random.default_rng(3)
-    times = np.sort(noise.uniform(0, 10, 30))
-    listed = rigidsim.parse(FREE, overrides=["time.end=", f"time.times={times.tolist()}"])
-    made = rigidsim.run(listed.replace({"output.record": ["angular_velocity", "quaternion"]}), out=None)
-    rates = made.dataset["angular_velocity"].values + 1e-3 * noise.standard_normal((30, 3))
-    table(folder / "rates.csv", ["time", "x", "y", "z"], [times, *rates.T])
-    energy = 0.5 * rates**2 @ np.array([1, 2, 2.5])
-    table(folder / "energy.csv", ["time", "value"], [times, energy])
-    q = made.dataset["quaternion"].values
-    table(folder / "attitude.csv", ["time", "w", "x", "y", "z"], [times, *q.T])
-
-
 RATES = data("rates.csv", "angular_velocity", ["x", "y", "z"], 1e-3)
-
-
-@pytest.mark.slow
-def test_differences_of_runs_give_the_same_fit_as_variational_equations(
-    here: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    seen_free(here)
-    keys = '[fit]\nparameters = ["initial.angular_velocity[1]", "body.principal_moments[1]"]\n'
-    energy = data("energy.csv", "0.5*wx^2 + wy^2 + 1.25*wz^2", ["value"], 2e-3)
-    axis = data("attitude.csv", "quaternion", ["w", "x", "y", "z"], 1e-3)
-    experiment = rigidsim.parse(FREE + keys + RATES + energy + axis)
-    one = rigidsim.fit(experiment)
-    monkeypatch.setattr(fitting, "ByTangents", lambda *given: ByDifferences(*given[:3]))
-    other = rigidsim.fit(experiment)
-    assert one.derivatives == "variational equations"
-    assert other.derivatives.startswith("central differences")
-    for first, second in zip(one.parameters, other.parameters, strict=True):
-        assert first.sigma is not None
-        # differences err by 1e-8 of the derivatives, and steps end below 1e-3 sigmas
-        assert second.sigma == pytest.approx(first.sigma, rel=1e-6)
-        assert abs(first.value - second.value) < 2e-3 * first.sigma
-        assert abs(first.value - {"i": 1.0, "b": 2.0}[first.key[0]]) < 4 * first.sigma
 
 
 @pytest.mark.slow

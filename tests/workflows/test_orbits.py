@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from support import cases
 
 import rigidsim
 from rigidsim.workflows.orbits import PLANETS, write_orbits
@@ -83,7 +84,7 @@ def rows(path: Path) -> np.ndarray:
 
 
 @here
-@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize("sign", cases([-1, 1], [-1]))
 def test_elements_are_those_of_another_integrator(
     bodies: tuple[np.ndarray, np.ndarray], tmp_path: Path, sign: int
 ) -> None:
@@ -110,6 +111,8 @@ def test_elements_are_those_of_another_integrator(
 
 
 @here
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_rows_are_averages_with_weights_of_hann(tmp_path: Path) -> None:
     (tmp_path / "mean").mkdir()
     write_orbits(["saturn"], "-20000 day", every="500 day", window=0, out=tmp_path)

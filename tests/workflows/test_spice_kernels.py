@@ -93,7 +93,7 @@ TURNED = Rotation.from_rotvec([np.radians(84381.406 / 3600), 0, 0])
     ("kind", "settings", "ahead", "says"),
     [
         ("ck", ("time.start=-250.5", "time.end=0.5", "time.samples=3"), T2029, ""),
-        ("pck", ('frame.axes="ecliptic J2000"',), T2029, "84381.406"),
+        pytest.param("pck", ('frame.axes="ecliptic J2000"',), T2029, "84381.406", marks=pytest.mark.slow),
         pytest.param("pck", SLOW, Fraction(-457963200), "", marks=pytest.mark.slow),
     ],
 )

@@ -211,21 +211,6 @@ def test_bad_sweeps_are_refused_before_work_begins(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_shares_make_the_same_dataset(folder: Path, tmp_path: Path) -> None:
-    (tmp_path / "c.toml").write_text(CONFIG + SWEEP)
-    run = CliRunner().invoke
-    for share, code in (("0:2", 0), ("2:9", 0)):
-        told = run(app, ["sweep", str(tmp_path / "c.toml"), "--out", str(tmp_path), "--tiles", share])
-        assert told.exit_code == code, told.output
-    found = open_sweep(tmp_path / "box")
-    assert found.finished
-    expected = open_sweep(folder).dataset.angular_velocity_final
-    np.testing.assert_array_equal(found.dataset.angular_velocity_final.values, expected.values)
-    wrong = run(app, ["sweep", str(tmp_path / "c.toml"), "--out", str(tmp_path), "--tiles", "3"])
-    assert wrong.exit_code == 2
-
-
-@pytest.mark.slow
 def test_what_a_batch_estimates_is_told_of_all_and_of_one(tmp_path: Path) -> None:
     output = CONFIG[CONFIG.index("estimate") : CONFIG.index("[[ev")]
     text = CONFIG.replace(output, "").replace('rates"', 'quaternion"')

@@ -150,6 +150,8 @@ def test_a_lost_member_takes_no_other_with_it(samples: int) -> None:
             assert table.tobytes() == found[member][0][name].tobytes(), name
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_events_and_guards_end_members() -> None:
     axes = {"initial.angular_velocity[0]": "values = [0.5, 0.6]"}
     stop = TORQUE + 'action = "stop"\ndirection = "down"\n'
