@@ -7,10 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-
-import rigidsim
 
 Config = Callable[..., str]
 Command = Callable[..., Any]
@@ -64,46 +61,6 @@ def test_run_refuses_all_before_it_starts_any(config: Config, rigidsim_command: 
     assert "[time] typo" in result.stderr
     assert result.stdout == ""
     assert not Path("runs").exists()
-
-
-# plan
-
-
-# info, plot, view
-
-
-# Guards
-
-
-@pytest.mark.slow
-def test_a_guard_ends_the_run_and_keeps_the_samples(config: Config, rigidsim_command: Command) -> None:
-    """And the next run is made."""
-    guard = "max_steps"
-    name = config(time="end = 1e6\nevery = 1", rest="[limits]\nmax_steps = 700")
-    result = rigidsim_command("run", name, config("next"))
-    assert read("runs/next")["status"] == "finished"
-    assert result.exit_code == 3
-    no_traceback(result)
-    summary = read("runs/free")
-    assert summary["status"] == f"stopped: {guard}"
-    assert summary["exit_code"] == 3
-    assert f"[limits] {guard}" in summary["message"]
-    assert summary["message"] in result.stderr
-    assert f"free  stopped: {guard}" in result.stdout
-    assert summary["bit_for_bit"]["claim"] is False
-    assert summary["cost"]["steps"] == 700
-    with rigidsim.open_run("runs/free").dataset as dataset:
-        count = dataset.sizes["time"]
-        assert 0 < count == summary["samples"] < summary["samples_planned"]
-        np.testing.assert_array_equal(dataset.time, np.arange(count))
-        assert dataset.attrs["status"] == f"stopped: {guard}"
-        assert all(np.isfinite(dataset[v]).all() for v in dataset.data_vars)
-    info = rigidsim_command("info", "runs/free")
-    assert info.exit_code == 0
-    assert f"free  stopped: {guard}" in info.stdout
-    assert f"{count:,} samples of " in " ".join(info.stdout.split())
-    assert rigidsim_command("plot", "runs/free", "--out", "x.png").exit_code == 0
-    assert Path("x.png").stat().st_size > 20_000
 
 
 def python(code: str, *arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:

@@ -1,6 +1,5 @@
 """Exports hold every number of the run, in files that other tools read."""
 
-import shutil
 from collections.abc import Callable
 from decimal import Decimal, localcontext
 from pathlib import Path
@@ -21,43 +20,18 @@ FLIGHT = {
 }
 
 
-@pytest.fixture(scope="module")
-def finished() -> dict[str, Path]:
-    """Folders of runs by the texts of their configs: most tests export the same few."""
-    return {}
-
-
 @pytest.fixture
-def run_once(
-    finished: dict[str, Path], rigidsim_command: Command, tmp_path_factory: pytest.TempPathFactory
-) -> Callable[[str], None]:
-    """Puts the run of a config below ``runs``, which is integrated where no test has done so."""
+def exported(config: Config, rigidsim_command: Command) -> Callable[..., list[Path]]:
+    """Runs a small flight and exports it; returns the files."""
 
-    def run(config: str) -> None:
-        text, folder = Path(config).read_text(), Path("runs", Path(config).stem)
-        if text not in finished:
-            assert rigidsim_command("run", config, "--force").exit_code == 0
-            finished[text] = tmp_path_factory.mktemp("finished") / "run"
-            shutil.copytree(folder, finished[text])
-        elif not folder.exists():
-            shutil.copytree(finished[text], folder)
-
-    return run
-
-
-@pytest.fixture
-def exported(
-    config: Config, run_once: Callable[[str], None], rigidsim_command: Command
-) -> Callable[..., Path]:
-    """Runs a small flight and exports it; returns the file."""
-
-    def export(file_format: str, integrator: str = "", *options: str) -> Path:
-        name = config("throw", time="end = 2\nsamples = 9", integrator=integrator, **FLIGHT)
-        run_once(name)
-        result = rigidsim_command("export", "runs/throw", "--format", file_format, *options)
-        assert result.exit_code == 0, result.output
-        assert result.output.splitlines()[0] == f"throw.{file_format}"
-        return Path(f"throw.{file_format}")
+    def export(precision: str, *formats: str, **more: str) -> list[Path]:
+        given = {"time": "end = 2\nsamples = 9", "integrator": f'precision = "{precision}"', **FLIGHT, **more}
+        assert rigidsim_command("run", config("throw", **given)).exit_code == 0
+        for file_format in formats:
+            result = rigidsim_command("export", "runs/throw", "--format", file_format)
+            assert result.exit_code == 0, result.output
+            assert result.output.splitlines()[0] == f"throw.{file_format}"
+        return [Path(f"throw.{file_format}") for file_format in formats]
 
     return export
 
@@ -71,11 +45,13 @@ def exact(dataset: Any, name: str, row: int, column: int) -> Decimal:
         return sum(values, Decimal(0))
 
 
-def test_csv_holds_every_digit(exported: Callable[..., Path]) -> None:
-    path = exported("csv", 'precision = "quadruple"')
+def test_csv_and_parquet_hold_every_digit(exported: Callable[..., list[Path]]) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    path, other = exported("quadruple", "csv", "parquet")
     lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
     names = lines[0].split(",")
     rows = [dict(zip(names, line.split(","), strict=True)) for line in lines[1:]]
+    table = parquet.read_table(other)
     with rigidsim.open_run("runs/throw").dataset as dataset:
         assert len(rows) == dataset.sizes["time"] == 9
         for row in range(9):
@@ -84,23 +60,16 @@ def test_csv_holds_every_digit(exported: Callable[..., Path]) -> None:
                 true = exact(dataset, "quaternion", row, column)
                 # nearer than half the last bit: it rounds back to the same number
                 assert abs(told - true) <= abs(true) / 2**113
-    assert "velocity_X [m s-1]" in path.read_text().split("time,")[0]
-
-
-def test_parquet_holds_values_and_residuals(exported: Callable[..., Path]) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet")
-    table = parquet.read_table(exported("parquet", 'precision = "quadruple"'))
-    with rigidsim.open_run("runs/throw").dataset as dataset:
         for part in ("", "_lo", "_lo2"):
-            column = table[f"angular_velocity{part}_y"].to_numpy()
             expected = dataset[f"angular_velocity{part}"].sel(body_axis="y")
-            np.testing.assert_array_equal(column, expected)
+            np.testing.assert_array_equal(table[f"angular_velocity{part}_y"].to_numpy(), expected)
+    assert "velocity_X [m s-1]" in path.read_text().split("time,")[0]
     assert table.schema.field("energy").metadata[b"units"] == b"J"
 
 
-def test_zarr_is_the_dataset(exported: Callable[..., Path]) -> None:
+def test_zarr_is_the_dataset(exported: Callable[..., list[Path]]) -> None:
     pytest.importorskip("zarr")
-    path = exported("zarr", 'precision = "extended"')
+    [path] = exported("extended", "zarr")
     with xarray.open_zarr(path) as store, rigidsim.open_run("runs/throw").dataset as dataset:
         assert set(store.variables) == set(dataset.variables)
         for name in dataset.variables:
@@ -109,47 +78,23 @@ def test_zarr_is_the_dataset(exported: Callable[..., Path]) -> None:
         assert store.attrs["config"] == dataset.attrs["config"]
 
 
-SKY = '[frame]\naxes = "ecliptic J2000"\n'
-TIMED = 'end = 2\nsamples = 9\nepoch = "2029-04-13T21:46:00 TDB"'
-
-
-EVENTFUL = '[[events]]\nname = "half"\nexpression = "t - 0.125"\n'
-
-
-@pytest.fixture
-def sky(config: Config, run_once: Callable[[str], None], rigidsim_command: Command) -> xarray.Dataset:
-    """A flight with an epoch, axes and an event, exported to the formats of text; its dataset."""
-    text = config("sky", time=TIMED, rest=SKY.replace("ecliptic J2000", "EME2000") + EVENTFUL, **FLIGHT)
-    run_once(text)
-    for file_format in ("csv", "aem", "oem"):
-        assert rigidsim_command("export", "runs/sky", "--format", file_format).exit_code == 0
-    with rigidsim.open_run("runs/sky").dataset as dataset:
-        return dataset.load()
-
-
 @pytest.mark.slow
-def test_independent_readers_read_orbit_messages(sky: xarray.Dataset) -> None:
-    """Epochs, frames and numbers as ``oem`` sees them."""
-    moments = [str(moment)[:23] for moment in sky.date.values]
+def test_independent_readers_read_messages(exported: Callable[..., list[Path]]) -> None:
+    """Epochs, frames and numbers as ``oem`` and ``brahe`` see them; not ``ccsds-ndm`` 3.1, which raises a
+    KeyError on every AEM 2.0 with quaternions.
+    """
+    time = 'end = 2\nsamples = 9\nepoch = "2029-04-13T21:46:00 TDB"'
+    exported("double", "aem", "oem", time=time, rest='[frame]\naxes = "EME2000"\n')
+    sky = rigidsim.open_run("runs/throw").dataset
     state = np.hstack([sky.position.values, sky.velocity.values]) / 1000
-    oem = pytest.importorskip("oem").OrbitEphemerisMessage.open("sky.oem")
-    assert (oem.segments[0].metadata["REF_FRAME"], oem.segments[0].metadata["TIME_SYSTEM"]) == (
-        "EME2000",
-        "TDB",
-    )
-    assert [str(s.epoch)[:23] for s in oem.states] == moments
+    oem = pytest.importorskip("oem").OrbitEphemerisMessage.open("throw.oem")
+    about = oem.segments[0].metadata
+    assert (about["REF_FRAME"], about["TIME_SYSTEM"]) == ("EME2000", "TDB")
+    assert [str(s.epoch)[:23] for s in oem.states] == [str(moment)[:23] for moment in sky.date.values]
     assert {s.epoch.scale for s in oem.states} == {"tdb"}
     found = [[*s.position, *s.velocity] for s in oem.states]
     np.testing.assert_allclose(found, state, rtol=1e-15, atol=1e-18)
-
-
-@pytest.mark.slow
-def test_an_independent_reader_reads_attitude_messages(sky: xarray.Dataset) -> None:
-    """``brahe``; not ``ccsds-ndm`` 3.1, which raises a KeyError on every AEM 2.0 with quaternions (it looks
-    for the field by the name of version 1), and would take the scalar for the first of the four.
-    """
-    brahe = pytest.importorskip("brahe.ccsds")
-    segment = brahe.AEM.from_file("sky.aem").segments[0]
+    segment = pytest.importorskip("brahe.ccsds").AEM.from_file("throw.aem").segments[0]
     frames = (segment.ref_frame_a, segment.ref_frame_b, segment.time_system)
     assert tuple(map(str, frames)) == ("EME2000", "SC_BODY_1", "TDB")
     found = [[q.w, q.x, q.y, q.z] for q in (row.quaternion for row in segment.states)]

@@ -3,15 +3,12 @@
 import functools
 from pathlib import Path
 
-import mpmath
 import pytest
 from matplotlib.image import imread
 
 ROOT = Path(__file__).parents[2]
 
 from experiments import all as everything  # noqa: E402
-from experiments import closed_forms  # noqa: E402
-from experiments.common import Check  # noqa: E402
 
 # some seconds each; `python -m experiments.all` runs all studies, before a version
 IN_CI = ("earth_free_nutation", "spectral_lines")
@@ -58,47 +55,3 @@ def test_a_wrong_expected_value_makes_the_exit_code_1(
     assert "FAILED" in capsys.readouterr().out
     assert everything.main(["earth_free_nutation", *arguments]) == 1
     assert "**FAILED**" in capsys.readouterr().out
-
-
-def check(measured: float, kind: str = "relative", tolerance: float = 0.1) -> Check:
-    return Check("x", measured, 10.0, tolerance, "s", "nowhere", kind)  # type: ignore[arg-type]
-
-
-def test_closed_forms_agree_with_quadrature() -> None:
-    with mpmath.workdps(30):
-        moments, rates = (
-            [mpmath.mpf(m) for m in ("3.09", "3.22", "1")],
-            [mpmath.mpf(w) for w in ("2", "3", "9.8")],
-        )
-        top = closed_forms.free_top(moments, rates)
-        assert top.m + top.complement == pytest.approx(1, abs=1e-25)
-        # sn^2 of the rates from the amplitudes: phi' = L (I1 w1^2 + I2 w2^2) / (L^2 - I3^2 w3^2)
-        twice = sum(i * w * w for i, w in zip(moments, rates, strict=True))
-        square = top.momentum**2
-
-        def rate(u: mpmath.mpf) -> mpmath.mpf:
-            sn = mpmath.ellipfun("sn", u, m=top.m)
-            w2 = (square - twice * top.i3) / (top.i2 * (top.i2 - top.i3)) * sn**2
-            e3 = (square - twice * top.i1 - top.i2 * (top.i2 - top.i1) * w2) / (top.i3 - top.i1)  # I3 w3^2
-            return top.momentum * (twice - e3) / (square - top.i3 * e3)
-
-        quarter = mpmath.ellipk(top.m)
-        assert abs(mpmath.quad(rate, [0, quarter]) / quarter - top.precession) < mpmath.mpf("1e-20")
-
-        a, c, mu = mpmath.mpf("2e-4"), mpmath.mpf("1e-4"), mpmath.mpf("0.0392266")
-        heavy = closed_forms.heavy_top(
-            a, c, mu, mpmath.mpf("0.5"), [mpmath.mpf(0), mpmath.mpf(2), mpmath.mpf(100)]
-        )
-
-        def azimuth(u: mpmath.mpf) -> mpmath.mpf:
-            height = heavy.u1 + (heavy.u2 - heavy.u1) * mpmath.ellipfun("sn", u, m=heavy.m) ** 2
-            return (heavy.vertical - heavy.axial * height) / (a * (1 - height**2))
-
-        # at the turning points all energy is in the precession and the height
-        for u in (heavy.u1, heavy.u2):
-            rate = (heavy.vertical - heavy.axial * u) / (a * (1 - u * u))
-            energy = a * rate**2 * (1 - u * u) / 2 + mu * u
-            start = a * 4 / mpmath.mpf(2) + mu * mpmath.cos(mpmath.mpf("0.5"))
-            assert abs(energy - start) < mpmath.mpf("1e-25")
-        quarter = mpmath.ellipk(heavy.m)
-        assert abs(mpmath.quad(azimuth, [0, quarter]) / quarter - heavy.precession) < mpmath.mpf("1e-20")

@@ -106,12 +106,21 @@ def test_the_motion_is_that_of_the_impulses(case: tuple[str, int]) -> None:
     assert wrong.max() < bound
 
 
-def test_it_is_missed_where_it_is_not_registered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And resumed bit for bit where it is."""
-    run = run_text(text("taylor") + "[limits]\nmax_steps = 9\n", out=tmp_path)
+@pytest.mark.parametrize("method", METHODS)
+def test_it_is_missed_where_it_is_not_registered(
+    method: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And where it is the run resumes bit for bit, with the errors that the solver announces."""
+    given = text(method, 25, 6.0)
+    run = run_text(given, "limits.max_steps=3", out=tmp_path, estimate=True)
     monkeypatch.setattr(Impulses, "of", lambda *_: None)
     with pytest.raises(rigidsim.RunFolderError, match='saved with "impulses", which is missing here'):
         rigidsim.resume(run.folder.path)
     monkeypatch.undo()
-    resumed = rigidsim.resume(run.folder.path, overrides=["limits.max_steps=100000"])
-    same_bits(run_text(text("taylor")), resumed)
+    runs = (
+        rigidsim.resume(run.folder.path, overrides=["limits.max_steps=100000"]),
+        run_text(given, estimate=True),
+    )
+    same_bits(*runs)
+    announced = [one.summary["accuracy"]["estimated_attitude_error"] for one in runs]
+    assert announced[0] == announced[1]

@@ -1,15 +1,12 @@
 """Meshes against the closed forms of the polyhedra that they are."""
 
 from collections import Counter
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-import rigidsim
-from rigidsim.look.solids import MINOR_SEGMENTS, SEGMENTS, Mesh, body_meshes, solid_mesh
-from rigidsim.scene.bodies.shapes import SHAPES, THINNESS, Arc, Revolved, Shape, StraightPiece
-from rigidsim.scene.scene import build_scene
+from rigidsim.look.solids import MINOR_SEGMENTS, SEGMENTS, Mesh, solid_mesh
+from rigidsim.scene.bodies.shapes import THINNESS
 
 # Area of the regular polygon inscribed in the unit circle, over pi.
 POLYGON = SEGMENTS / (2 * np.pi) * np.sin(2 * np.pi / SEGMENTS)
@@ -72,33 +69,3 @@ def test_surface_is_closed_and_normals_point_outwards(solid: str) -> None:
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     along = np.einsum("tij,tj->ti", mesh.normals, facing)
     assert (along > 0).all()
-
-
-HEMISPHERE = Shape(
-    {"radius": 1},
-    "dome towards z",
-    lambda _, d: [83 * d["radius"][0] ** 2 / 320] * 2 + [2 * d["radius"][0] ** 2 / 5],
-    lambda d: Revolved(
-        (
-            StraightPiece((0.0, -3 * d["radius"][0] / 8), (d["radius"][0], -3 * d["radius"][0] / 8)),
-            Arc((0.0, -3 * d["radius"][0] / 8), d["radius"][0], 0.0, np.pi / 2),
-        )
-    ),
-    {"pole": lambda c, d: [c.zero, c.zero, 5 * d["radius"][0] / 8]},
-)
-
-
-def test_a_shape_is_one_entry(monkeypatch: pytest.MonkeyPatch, free_body: Callable[..., str]) -> None:
-    """Config, inertia, landmark and picture of a hemisphere: I = (83/320 + 25/64) m r^2 about its pole."""
-    monkeypatch.setitem(SHAPES, "hemisphere", HEMISPHERE)
-    table = 'shape = "hemisphere"\nradius = 2\nmass = 3\nreference = "pole"'
-    text = free_body().replace("principal_moments = [1, 2, 2.5]", table)
-    found = build_scene(rigidsim.parse(text)).body
-    expected = 3 * 4 * np.array([83 / 320 + 25 / 64, 83 / 320 + 25 / 64, 2 / 5])
-    np.testing.assert_allclose([float(m) for m in found.principal_moments], expected, rtol=1e-14)
-    (mesh,) = body_meshes(found.drawing)
-    # an inscribed polyhedron, see the ellipsoid above
-    deficit = 1 - volume_of(mesh) / (2 / 3 * np.pi * 8)
-    assert 0 < deficit < (np.pi / 2 / MINOR_SEGMENTS) ** 2 / 2 + (2 * np.pi / SEGMENTS) ** 2 / 2
-    np.testing.assert_allclose(mesh.vertices[:, 2].max(), 0, atol=1e-12)
-    np.testing.assert_allclose(mesh.vertices[:, 2].min(), -2, atol=1e-12)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
-from support import IMPATIENT, config, law, run_text, same_bits
+from support import config, law, run_text
 
 import rigidsim
 from rigidsim import ConfigError
@@ -92,39 +92,9 @@ def test_without_an_anomaly_the_mean_longitude_advances_by_keplers_law(direct: x
     assert apart(direct, kepler) > 1e-6  # and the phase matters
 
 
-@pytest.fixture(scope="module")
-def saved(tmp_path_factory: pytest.TempPathFactory) -> rigidsim.Run:
-    """A table beside its config, which is gone after the run; then prolonged in chunks of few steps."""
-    folder = tmp_path_factory.mktemp("table")
-    (folder / "orbit.csv").write_text(table(4.0), encoding="utf-8")
-    path = folder / "planet.toml"
-    path.write_text(PLANET % '{table = "orbit.csv"}', encoding="utf-8")
-    run = rigidsim.run(rigidsim.load(path, overrides=["time.end='100 day'"]), out=folder)
-    (folder / "orbit.csv").unlink()
-    return rigidsim.resume(run.folder.path, until="210 day", tuning=IMPATIENT)
-
-
-@pytest.mark.slow
-def test_a_prolonged_run_is_the_run_in_one_go_and_verified_without_the_file(saved: rigidsim.Run) -> None:
-    same_bits(saved.dataset, run_text(by_table(4.0)).dataset)
-    assert rigidsim.verify(saved.folder.path).identical
-    assert "mean_anomaly [deg]" in saved.dataset.attrs["config_given"]
-
-
 def test_what_a_table_can_not_be_combined_with() -> None:
     with pytest.raises(ConfigError, match="edges of a table"):
         prepare(rigidsim.parse(by_table(40.0), overrides=["output.lyapunov=true"]))
-
-
-@pytest.mark.slow
-def test_steps_end_at_kinks_and_at_rows() -> None:
-    kinked = '[[loads]]\nkind = "torque"\ncomponents = ["1e-12*max(sin(t/1e5), 0)", "1e-11*sign(qx*qz)", 0]\n'
-    by_rows, by_elements = (
-        run_text(text.replace("[frame]", kinked + "[frame]")).dataset
-        for text in (by_table(4.0), PLANET % KEPLER)
-    )
-    assert apart(by_rows, by_elements) < 1e-10  # rows 4 days apart: interpolated to some 1e-11
-    assert apart(by_rows, run_text(by_table(4.0)).dataset) > 1e-3
 
 
 def test_mars_with_a_table_of_its_orbit_has_the_obliquity_of_almanacs() -> None:

@@ -118,23 +118,6 @@ def test_no_input_is_written_over(seed: int, made: Path, monkeypatch: pytest.Mon
             Path(name).unlink()
 
 
-@pytest.mark.slow
-def test_every_file_that_is_written_at_every_file_that_is_read(
-    made: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(made)
-    before, tried = bytes_of(made), 0
-    for command, options, inputs in FILES:
-        for option in options:
-            for given in inputs:
-                for force in [] if command.startswith(("plot", "view")) else ["--force"], []:
-                    line = [*command.split(), option, given, *force]
-                    assert called(line).exit_code == 2, line
-                    assert bytes_of(made) == before, line
-                    tried += 1
-    assert tried > 100
-
-
 def test_other_files_need_force(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(made)
     for command, options, _ in FILES:

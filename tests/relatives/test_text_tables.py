@@ -108,6 +108,26 @@ def test_sample_times_of_any_style(seed: int, tmp_path: Path) -> None:
     )
     exact = [Fraction(cell) * Fraction(str(UNITS[unit])) for cell in cells]
     assert list(build_scene(experiment).samples.times or ()) == exact, text
+    alone = rigidsim.parse(experiment.text)  # without the file, of which only times are taken
+    assert list(build_scene(alone).samples.times or ()) == exact
+    assert not re.search(r"\by\b", alone.config.tables["theirs.csv"].text)
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ("qw,qx\n1,0\n", "names no column t or time"),
+        ("t,wx\n0,1\n0,2\n", "times must increase"),
+        ("wx,t\n0,1\n2\n", "line 3 has 1 values, where the line of names has 2"),
+        ("", "without files next to it"),
+    ],
+)
+def test_tables_that_hold_no_times_are_refused(rows: str, words: str, tmp_path: Path) -> None:
+    text = SPIN.replace("end = 11", 'times = "theirs.csv"')
+    (tmp_path / "theirs.csv").write_text(rows)
+    (tmp_path / "config.toml").write_text(text)
+    with pytest.raises(rigidsim.ConfigError, match=words):
+        build_scene(rigidsim.load(tmp_path / "config.toml") if rows else rigidsim.parse(text))
 
 
 BAD = {

@@ -4,15 +4,12 @@ The truth: a table of units by hand, and numpy. A body held at its centre of mas
 no torque on it; one with a position flies.
 """
 
-import json
-
 import numpy as np
 import pytest
 from support import config, run_text, seeds
 
 from rigidsim.look.figures.catalogue import available
 from rigidsim.look.record import scene_of
-from rigidsim.look.stages.bodies import source_arrows
 from rigidsim.look.stages.registry import build_picture
 
 UNITS = {"m/s^2": 1.0, "cm/s^2": 0.01, "km/s^2": 1000.0, "mm/s^2": 0.001, "": 1.0}
@@ -62,25 +59,3 @@ def test_random_fields(seed: int) -> None:
     for part in drawn:
         way = part.values / np.linalg.norm(part.values)
         assert way == pytest.approx(-up, abs=1e-9)
-
-
-@pytest.mark.parametrize("seed", seeds(1, 50))
-def test_many_sources(seed: int) -> None:
-    """Of up to 300 sources all are drawn whose tide is a thousandth of the strongest one's or more."""
-    rng = np.random.default_rng([2, seed])
-    dataset = run_text(TEXT.format(arm="[0, 0, 0]", start="", loads="", more="")).dataset
-    count = int(rng.integers(100, 300))
-    places, strengths = rng.normal(size=(count, 3)) * 1e8, 10 ** rng.uniform(8, 12, count)
-    objects = [
-        {"what": "source", "gravitational_parameter": strength, "position": place}
-        for place, strength in zip(places.tolist(), strengths.tolist(), strict=True)
-    ]
-    scene = json.loads(dataset.attrs["scene"]) | {"objects": objects}
-    dataset = dataset.assign_attrs(scene=json.dumps(scene))
-    drawn = {part.path[7:]: part.values[0] for part in source_arrows(dataset, 1.0)}
-    tides = strengths / np.linalg.norm(places, axis=1) ** 3
-    seen = np.flatnonzero(tides >= 1e-3 * tides.max())
-    assert set(drawn) == {f"source{k}" for k in seen}
-    for k in seen:
-        way = drawn[f"source{k}"] / np.linalg.norm(drawn[f"source{k}"])
-        assert way == pytest.approx(places[k] / np.linalg.norm(places[k]), abs=1e-9)

@@ -2,7 +2,6 @@
 
 import itertools
 
-import mpmath
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -71,21 +70,6 @@ def test_in_the_singularity_the_last_angle_is_zero(sequence: str) -> None:
             max(abs(x - y) for r, s in zip(turned, back, strict=True) for x, y in zip(r, s, strict=True))
             <= LAST
         )
-
-
-def test_fifty_digits_are_those_of_closed_forms() -> None:
-    with mpmath.workdps(60):
-        least = mpmath.mpf(10) ** -50
-        third = 1 / mpmath.sqrt(3)
-        unit = built("quaternion = [1, 1, 1, 0]").quaternion
-        sixty = built('euler_angles = ["60 deg", 0, 0]').quaternion
-        for found, expected in (
-            (unit, [third, third, third, 0]),
-            (sixty, [mpmath.sqrt(3) / 2, 0, 0, mpmath.mpf(1) / 2]),
-        ):
-            assert max(abs(a - b) for a, b in zip(found, expected, strict=True)) < least
-        tiny = built('euler_angles = ["1e-200", 0, 0]').quaternion
-        assert abs(tiny[3] / mpmath.mpf("0.5e-200") - 1) < least
 
 
 def test_angular_momentum_is_given_in_space_axes() -> None:

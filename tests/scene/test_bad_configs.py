@@ -6,10 +6,8 @@ from typing import Any
 
 import heyoka
 import pytest
-from typer.testing import CliRunner
 
 from rigidsim import ConfigError, load, parse
-from rigidsim.cli.app import app
 from rigidsim.scene.schema import editor_schema
 from rigidsim.solve.problem import prepare
 
@@ -269,28 +267,6 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
             load(path)
         assert str(path) in str(caught.value)
         assert f"file: can't be read: {why}" in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("tables", "where", "phrases"),
-    [
-        ({"body": "principal_moments = [1, 2, 3.25]"}, "[body] principal_moments", ["I1 + I2 >= I3"]),
-        ({"more": '[sweep]\nmode = "zip"'}, "[sweep] axes", ["missing"]),
-    ],
-)
-def test_the_command_line_says_it_and_leaves_no_folder(
-    tmp_path: Path, tables: dict[str, str | None], where: str, phrases: list[str]
-) -> None:
-    path, out = tmp_path / "bad.toml", tmp_path / "runs"
-    path.write_text(config(**tables), encoding="utf-8")
-    result = CliRunner().invoke(app, ["run", str(path), "--out", str(out)])
-    assert result.exit_code == 2
-    assert result.stdout == ""
-    assert result.stderr.startswith(f"rigidsim: {path}: 1 problem in the config\n  {where}: ")
-    for phrase in phrases:
-        assert phrase in result.stderr
-    assert "Traceback" not in result.stderr
-    assert not out.exists()
 
 
 def test_every_table_is_named_in_brackets() -> None:

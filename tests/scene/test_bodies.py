@@ -205,17 +205,3 @@ def test_a_parts_euler_angles_turn_its_tensor() -> None:
 
 
 # ---- the Earth --------------------------------------------------------------------------------------------
-
-
-def test_earth() -> None:
-    """Mathews, Herring & Buffett 2002: (C - A)/C = 0.00327379492, free nutation in 304.456 rotations."""
-    earth = body('preset = "earth"')
-    a, b, c = earth.principal_moments
-    assert a == b
-    assert abs((c - a) / c - number(Fraction("0.00327379492"))) <= LAST
-    assert abs(a / (c - a) / CONTEXT.mpf("304.456") - 1) < 1e-6  # six digits are published
-    assert abs(c / CONTEXT.mpf("8.0365e37") - 1) <= LAST
-    assert earth.mass == number(Fraction("5.9722e24"))
-    # C/(M R^2) = 0.3307 (Groten 2004) ties moments, mass and radius together
-    assert abs(float(c / earth.mass) / 6378136.6**2 - 0.3307) < 1e-4
-    assert "Mathews" in earth.source

@@ -112,16 +112,3 @@ def test_forty_digits_reach_the_scene_and_the_states() -> None:
         assert abs(as_fraction(prepared.precision.exact(scalar)) - Fraction(float(FORTY))) > half_ulp
     unit = Fraction(2) ** prepared.system.state_exponents[0]
     assert as_fraction(prepared.system.initial[0]) * unit == as_fraction(scene.angular_velocity[0])
-
-
-def test_the_precision_decides_what_a_tenth_is() -> None:
-    rates = {}
-    for name in ("double", "quadruple", "50"):
-        wanted = f'"{name}"' if name.isalpha() else name
-        prepared = prepare(parse(scene_text(rate="0.1", integrator=f"precision = {wanted}")))
-        number = prepared.precision.number(prepared.scene.angular_velocity[0])
-        rates[name] = as_fraction(prepared.precision.exact(number))
-    assert rates["double"] == Fraction(0.1)
-    tenth = Fraction(1, 10)
-    errors = [abs(rates[name] - tenth) for name in ("double", "quadruple", "50")]
-    assert errors[0] > 10**15 * errors[1] > 10**15 * 10**14 * errors[2]

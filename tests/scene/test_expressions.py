@@ -52,26 +52,6 @@ def refused(text: str) -> ExpressionError:
 # ---- meaning ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("1+2*3", 7),
-        ("12/3/2", 2),
-        ("2^3^2", 512),
-        ("(2^3)^2", 64),
-        ("-2^2", -4),
-        ("2^-1", Fraction(1, 2)),
-        ("2^-2^2", Fraction(1, 16)),
-        ("-+-3", 3),
-        ("1e3", 1000),
-        ("1_000", 1000),
-        ("1.5E-1", Fraction(3, 20)),
-    ],
-)
-def test_precedence_and_associativity(text: str, expected: Fraction | int) -> None:
-    assert exact(text) == expected
-
-
 def test_decimals_and_parameters_stay_exact() -> None:
     assert exact("0.1 + 0.2") == Fraction(3, 10)
     assert exact("1/3 + 1/6 - k") == Fraction(1, 4)

@@ -78,25 +78,6 @@ def test_max_drift_ends_with_the_first_sample_past_it(tmp_path: Path) -> None:
     same_bits(done, complete)
 
 
-@pytest.mark.slow
-@pytest.mark.unoptimised
-def test_max_drift_looks_at_the_last_sample_too(tmp_path: Path) -> None:
-    """Below a rounding no run keeps it; one that is short is over before guards are looked at again."""
-    closed = 'method = "closed_form"'
-    text = config(time="end = 3\nsamples = 49", integrator=closed, output=PLAIN)
-    data = loaded(run_text(text, out=tmp_path / "whole"))
-    drift = np.abs(data["energy_drift"].values)
-    largest = int(np.argmax(drift))
-    just_below = float(np.nextafter(drift[largest], 0))
-    last = config(time=f"end = {largest / 16}\nevery = 0.0625", integrator=closed, output=PLAIN)
-    for out, given, guard in (("a", text, 1e-17), ("b", last, just_below)):
-        run = run_text(given, f"limits.max_drift={guard!r}", out=tmp_path / out)
-        assert (run.status, run.summary["exit_code"]) == ("stopped: max_drift", 3)
-    again = rigidsim.resume(run.folder.path)
-    assert again.status == "stopped: max_drift"
-    assert rigidsim.resume(run.folder.path, overrides=["limits.max_drift=1"]).status == "finished"
-
-
 def test_an_event_past_the_last_sample_ends_nothing(tmp_path: Path) -> None:
     """Steps go past the last sample, which is where the run ends; prolonged, it ends at the event."""
     late = '[[events]]\nname = "late"\nexpression = "t - 10.01"\naction = "stop"'

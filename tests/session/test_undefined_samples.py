@@ -1,7 +1,5 @@
 """Samples that aren't defined are counted; those lost on the way are warned of, those of the start aren't."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from support import IMPATIENT, config
@@ -53,18 +51,3 @@ def test_what_the_start_leaves_undefined_is_told_but_no_alarm(push: float, since
     assert undefined(run, "precession_angle").tolist() == [True] * since + [False] * (13 - since)
     assert run.summary["undefined_samples"] == {"precession_angle": since}
     assert run.summary["warnings"] == []
-
-
-def test_members_of_a_batch_are_warned_of_as_single_runs_are(tmp_path: Path) -> None:
-    axes = 'axes."initial.angular_velocity[0]" = {values = [0.1, 0.0]}'  # the other stays where it is
-    text = FLIPPING.replace("0.05]", "0.0]") + f'[sweep]\nkeep = ["final"]\n{axes}\n'
-    codes = {}
-    for batch in (True, False):
-        experiment = rigidsim.parse(f"{text}batch = {str(batch).lower()}\n")
-        sweep = rigidsim.sweep(experiment, out=tmp_path / str(batch))
-        assert any("batch" in engine for engine in sweep.summary["engines"]) == batch
-        warnings = sweep.dataset.warnings
-        meanings = warnings.attrs["flag_meanings"].split()
-        bit = 1 << meanings.index("undefined")
-        codes[batch] = [bool(bits & bit) for bits in warnings.values.tolist()]
-    assert codes == {True: [True, False], False: [True, False]}

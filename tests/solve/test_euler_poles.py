@@ -81,30 +81,6 @@ def test_a_start_in_a_pole_keeps_the_angles_given(case: tuple[str, str]) -> None
     assert np.abs(np.diff(first - last)).max() < 0.1  # of at most 0.04 rad that the body turns
 
 
-def crossings(start: str, expression: str, formulation: str) -> np.ndarray:
-    text = config(
-        initial=start,
-        time="end = 3\nsamples = 3",
-        integrator=f'formulation = "{formulation}"',
-        output=RECORD,
-        more=f'[[events]]\nname = "it"\nexpression = "{expression}"',
-    )
-    return np.asarray(run_text(text).dataset["it_time"].values)
-
-
-TUMBLE = "angular_velocity = [0.3, 0.2, 1]"
-
-
-@pytest.mark.slow
-def test_events_see_a_motion_leave_the_pole() -> None:
-    """As one that reads the elements of R: phi is the angle of (R_xz, -R_yz)."""
-    # the angle of a vector that vanishes at the start, so that this product does, too
-    same = "2*(qx*qz + qw*qy)*cos(1) + 2*(qy*qz - qw*qx)*sin(1)"
-    truth, found = (crossings(TUMBLE, text, "quaternion") for text in (same, "phi - 1"))
-    assert len(found) == 1
-    assert np.abs(truth - found[0]).min() < 1e-12
-
-
 TILTS = ["0", "0", "1e-30", "1e-18", "1e-16", "1e-15", "1e-14", "1e-12", "1e-9", "1e-6", "1e-3", "0.01"]
 
 

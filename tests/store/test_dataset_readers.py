@@ -22,27 +22,6 @@ from rigidsim.store.netcdf import ChunkedVariable, reading, stored_rows
 
 PRECISIONS = ['"double"', '"quadruple"']
 
-HEAVY_TOP = """\
-name = "top"
-description = "a comment"
-[body]
-principal_moments = [2, 2, 1]
-mass = 1
-center_of_mass = [0, 0, 0.5]
-[initial]
-euler_angles = [0, 0.5, 0]
-angular_velocity = [0, 0, 8]
-[[loads]]
-kind = "uniform_gravity"
-[time]
-end = 1
-samples = 33
-[integrator]
-formulation = "euler_angles"
-[output]
-timeline = false
-"""
-
 # variable: (dims beside time, units, frame or None, invariant), from the interface's section 3
 FREE = {
     "angular_velocity": (("body_axis",), "rad s-1", "body axes", False),
@@ -51,26 +30,10 @@ FREE = {
     "angular_momentum_norm": ((), "kg m2 s-1", None, True),
     "energy": ((), "J", None, True),
 }
-TOP = {
-    "angular_velocity": (("body_axis",), "rad s-1", "body axes", False),
-    "quaternion": (("quaternion_component",), "1", "body to space", False),
-    "euler_angles": (("euler_angle",), "rad", "body to space", False),
-    "angular_momentum": (("space_axis",), "kg m2 s-1", "space axes", False),
-    "angular_momentum_norm": ((), "kg m2 s-1", None, False),
-    "angular_momentum_vertical": ((), "kg m2 s-1", "space axes", True),
-    "angular_momentum_axial": ((), "kg m2 s-1", "body axes", True),
-    "energy": ((), "J", None, True),
-    "potential_energy": ((), "J", None, False),
-    "tilt": ((), "rad", None, False),
-    "precession_angle": ((), "rad", "space axes", False),
-    "spin_angle": ((), "rad", None, False),
-    "tip": (("space_axis",), "m", "space axes", False),
-}
 LABELS = {
     "body_axis": ["x", "y", "z"],
     "space_axis": ["X", "Y", "Z"],
     "quaternion_component": ["w", "x", "y", "z"],
-    "euler_angle": ["phi", "theta", "psi"],
 }
 
 
@@ -81,12 +44,6 @@ def free(
     """A free body in each precision, with its name."""
     text = free_body(precision=request.param)
     return request.param, rigidsim.run(rigidsim.parse(text), out=tmp_path_factory.mktemp("free"))
-
-
-@pytest.fixture(scope="module")
-def top(tmp_path_factory: pytest.TempPathFactory) -> rigidsim.Run:
-    """A heavy top in Euler angles."""
-    return rigidsim.run(rigidsim.parse(HEAVY_TOP), out=tmp_path_factory.mktemp("top"))
 
 
 def test_every_reader_reads_the_same(free: tuple[str, rigidsim.Run]) -> None:
@@ -111,22 +68,15 @@ def test_every_reader_reads_the_same(free: tuple[str, rigidsim.Run]) -> None:
                 np.testing.assert_array_equal(values, raw[name][:], strict=True)
 
 
-@pytest.mark.parametrize("which", ["free", "top"])
-def test_variables_carry_labels_and_attributes(
-    which: str, free: tuple[str, rigidsim.Run], top: rigidsim.Run
-) -> None:
-    expected, path = (FREE, free[1].folder.dataset) if which == "free" else (TOP, top.folder.dataset)
-    with xarray.open_dataset(path) as dataset:
-        used = {dim for dims, *_ in expected.values() for dim in dims}
+def test_variables_carry_labels_and_attributes(free: tuple[str, rigidsim.Run]) -> None:
+    with xarray.open_dataset(free[1].folder.dataset) as dataset:
+        used = {dim for dims, *_ in FREE.values() for dim in dims}
         assert set(map(str, dataset.coords)) - {"time", "time_lo", "time_lo2", "time_lo3"} == used
         for dim in used:
             assert dataset[dim].values.tolist() == LABELS[dim]
-        if which == "top":
-            assert dataset.euler_angles.attrs["euler_sequence"] == "zxz"
-            assert dataset.euler_angles.attrs["convention"] == "intrinsic"
         plain = [v for v in map(str, dataset.data_vars) if not re.search(r"_lo\d*$|_drift$", v)]
-        assert set(plain) == set(expected)
-        for name, (dims, units, frame, invariant) in expected.items():
+        assert set(plain) == set(FREE)
+        for name, (dims, units, frame, invariant) in FREE.items():
             variable = dataset[name]
             assert variable.dims == ("time", *dims)
             assert variable.attrs["units"] == units

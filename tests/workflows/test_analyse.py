@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import mpmath
 import numpy as np
 import pytest
 import xarray
@@ -12,59 +11,11 @@ from support import config, run_text
 from typer.testing import CliRunner
 
 import rigidsim
-from experiments.spectral_lines import Case, free
 from rigidsim import RigidsimError
 from rigidsim.cli.app import app
 from rigidsim.scene.scene import build_scene
 
 MOMENTS, RATES = ["3", "2", "1"], ["0.3", "0.2", "1"]
-
-
-def tumbling(
-    periods: float, precision: str, every: str, tmp_path: Path, record: str = '"angular_velocity"'
-) -> tuple[rigidsim.Run, Case]:
-    """A free asymmetric body in closed form, and its elliptic functions by mpmath."""
-    with mpmath.workdps(60):
-        exact = free("tumbling", MOMENTS, RATES, "", 1)
-        end = mpmath.nstr(periods * exact.period, 12)
-        text = config(
-            exact.body,
-            exact.initial,
-            time=f"end = {end}\nevery = {every}",
-            integrator=f'precision = "{precision}"\nmethod = "closed_form"',
-            output=f"record = [{record}]\nestimate = false",
-        )
-        return run_text(text), exact
-
-
-def wrong(analysis: Any, exact: Case, share: float) -> list[float]:
-    """Relative errors of the frequencies of lines above a share of their signal's strongest, by labels."""
-    rates = exact.exact
-    errors = []
-    for signal in analysis.signals:
-        for line in signal.lines:
-            if line.amplitude < share * signal.lines[0].amplitude:
-                continue
-            assert line.label.multipliers, (signal.name, float(line.frequency))
-            combined = sum(
-                m * rates[k.name] for m, k in zip(line.label.multipliers, analysis.known, strict=True)
-            )
-            errors.append(float(abs(line.frequency - combined) / max(rates.values())))
-    return errors
-
-
-@pytest.mark.slow
-def test_lines_of_a_free_body_are_multiples_of_its_period(tmp_path: Path) -> None:
-    run, exact = tumbling(400, "double", "0.8", tmp_path)
-    analysis = rigidsim.analyse(run, "angular_velocity")
-    # eps over the angle turned and over the share of the largest line
-    with mpmath.workdps(40):
-        assert max(wrong(analysis, exact, 1e-2)) < 1e-15
-        assert max(wrong(analysis, exact, 1e-5)) < 1e-13
-    signal = analysis["angular_velocity.x+iy"]
-    assert all(line.label.text for line in signal.lines), "each line has its name"
-    assert {abs(line.label.multipliers[0]) % 2 for line in signal.lines} == {1}
-    assert {line.label.multipliers[0] % 2 for line in analysis["angular_velocity.z"].lines} == {0}
 
 
 def test_the_free_nutation_of_the_earth() -> None:

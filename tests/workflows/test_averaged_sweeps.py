@@ -25,16 +25,6 @@ SPINNING = config(
     name="precessing",
     estimate=True,
 )
-DAMPED = SPINNING.replace(
-    "[model]", '[[loads]]\nkind = "viscous_torque"\ncoefficients = [1e-4, 1e-4, 2e-4]\n[model]'
-).replace("[0.98, 0.98, 1]", "[0.7, 0.8, 1]")
-KEEPING_PACE = (
-    SPINNING.replace("[0, 0, 60]", "[0, 0, 1]")
-    .replace("[0.98, 0.98, 1]", "[0.998, 0.999, 1]")
-    .replace("eccentricity = 0.2", "eccentricity = 0.02")
-    .replace("spin_averaged", "orbit_averaged")
-    .replace('["20 deg", "50 deg"]', '["5 deg", "8 deg"]')
-)
 MIXED = SPINNING.replace('axes."initial.euler_angles[1]"', 'axes."model.level"').replace(
     '["20 deg", "50 deg"], name = "lean"', '["spin_averaged", "full"]'
 )
@@ -67,12 +57,6 @@ def test_a_sweep_keeps_and_tells_the_error_of_each_model(tmp_path: Path) -> None
     assert "axes of averaged models" in told
     assert "of its integration alone" in told
     assert "for errors" in told
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("text", [DAMPED, KEEPING_PACE])
-def test_so_does_every_kind_of_average(text: str, tmp_path: Path) -> None:
-    as_single_runs(text, tmp_path)
 
 
 @pytest.mark.slow

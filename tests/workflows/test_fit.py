@@ -97,30 +97,6 @@ def test_a_uniform_spin_is_a_straight_line_with_the_covariance_of_one(here: Path
     assert found.experiment.config.fit is None
 
 
-@pytest.mark.slow
-def test_its_cone_in_the_viewer_is_as_wide_as_the_covariance_of_a_straight_line(here: Path) -> None:
-    """Across z, the phase moves the x axis, which is the figure axis; along z nothing does."""
-    pytest.importorskip("rerun")
-    from rigidsim.look.stages.registry import build_picture
-    from rigidsim.workflows.view import runs_of
-
-    turning(here)
-    keys = '[fit]\nparameters = ["initial.attitude[2]", "initial.angular_velocity[2]"]\n'
-    (here / "ball.toml").write_text(f'{BALL}[frame]\nfigure_axis = "x"\n{keys}{TURN}')
-    rigidsim.fit("ball.toml", out="fits")
-    ((name, run),) = runs_of([here / "fits" / "ball"])
-    assert name == "ball"
-    now = np.stack([np.ones(run.dataset.sizes["time"]), run.dataset["time"].values], axis=1)
-    expected = np.sqrt(np.einsum("ti,ij,tj->t", now, SIGMA**2 * np.linalg.inv(LINE.T @ LINE), now))
-    (plot,) = build_picture(run.dataset)[0].plots
-    assert plot.unit == "deg"
-    angles = np.radians(plot.values)
-    np.testing.assert_allclose(angles[:, 0], expected, rtol=1e-5)
-    np.testing.assert_allclose(angles[:, 1], 0.0, atol=1e-8)
-    assert "attitude_error" not in run.dataset.attrs  # the integration's own, which isn't what is meant here
-    assert "converged" in run.dataset.attrs["fit"]
-
-
 def test_a_considered_rate_and_a_prior_enter_as_their_formulas_say(here: Path) -> None:
     turning(here)
     known, prior = 0.02, 0.015

@@ -72,24 +72,6 @@ def test_replaced_values_keep_the_rest() -> None:
     assert experiment.config.name == "top"
 
 
-def test_a_run_in_memory_is_the_saved_one(tmp_path: Path) -> None:
-    tables = {
-        **TOP,
-        "events": [EVENT],
-        "integrator": {"precision": "extended"},
-        "output": {"timeline": False},
-    }
-    saved = rigidsim.run(tables, out=tmp_path)
-    kept = rigidsim.run(Experiment.from_dict(tables), out=None)
-    assert kept.status == saved.status == "finished"
-    assert set(kept.dataset.variables) == set(saved.dataset.variables)  # compared in store/test_in_memory.py
-    for run in (saved.summary, kept.summary):
-        for name in ("cost", "dataset_sha256", "provenance"):
-            run.pop(name, None)
-    assert kept.summary == saved.summary
-    assert [path.name for path in tmp_path.iterdir()] == ["top"]
-
-
 @pytest.mark.slow
 def test_a_run_in_memory_shows_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     """As text and table, in figures, and in the viewer."""

@@ -3,7 +3,6 @@
 import json
 import math
 import re
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -68,47 +67,8 @@ def attitudes(text: str) -> list[np.ndarray]:
     return [run.dataset[part].values for part in parts_in(run.dataset, "quaternion")]
 
 
-def as_left_out(planet: bool, degree: bool, figure: bool, sun: bool) -> set[str]:
-    """Codes of the outermost effects that aren't there."""
-    found = set() if sun else {"sun"}
-    found |= {"planet"} if not planet else set()
-    found |= {"planet-degree-3"} if planet and not degree else set()
-    return found | ({"planet-figure"} if planet and not figure else set())
-
-
-def closed(codes: frozenset[str]) -> set[str]:
-    """The codes and their parts."""
-    parts = {"planet": {"planet-degree-3", "planet-figure"}}
-    return set(codes).union(*(parts.get(code, set()) for code in codes))
-
-
 def required(text: str, error: str, out: Path, **given: Any) -> Any:
     return rigidsim.required_physics(rigidsim.parse(text), error, out=out, **given)
-
-
-@pytest.mark.campaign
-def test_no_cheaper_model_is_within_the_error(tmp_path: Path) -> None:
-    """Of a body without a core."""
-    full = attitudes(satellite(core=False))
-    errors: dict[frozenset[str], float] = {}
-    for flags in product((True, False), repeat=4):
-        code = frozenset(as_left_out(*flags))
-        if code not in errors:
-            errors[code] = (
-                float(angles_between(full, attitudes(satellite(*flags, core=False))).max()) * ARCSEC
-            )
-    assert len(errors) == 10
-    for error in (0.4, 20.0):
-        plan = required(satellite(core=False), f"{error} arcsec", tmp_path)
-        for row in plan.effects:
-            assert row.largest_arcsec == pytest.approx(errors[frozenset([row.code])], rel=1e-6, abs=1e-9)
-        least = frozenset(plan.least.left_out)
-        assert errors[least] <= error
-        assert plan.least.largest_arcsec == pytest.approx(errors[least], rel=1e-6, abs=1e-9)
-        for codes, angle in errors.items():  # nothing more can be left out
-            assert angle > error or not closed(codes) > closed(least), codes
-        gone = {row.code for row in plan.effects if not row.required}
-        assert gone == closed(least)
 
 
 @pytest.mark.slow
