@@ -73,7 +73,6 @@ def digest(path: Path) -> str:
 USUAL = (  # of each kind one, cheap to compile; the others by hand, before versions, and eight a day
     "asymmetric_top",
     "earth_precession_averaged",
-    "heavy_top_nutating",
 )
 
 

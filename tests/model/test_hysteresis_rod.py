@@ -45,7 +45,7 @@ def test_a_rod_in_a_strong_field_goes_round_its_limiting_loop() -> None:
     assert lost == pytest.approx(1e-6 * area, rel=5e-3)
 
 
-@pytest.mark.parametrize("seed", seeds(2, 30))
+@pytest.mark.parametrize("seed", seeds(1, 30))
 def test_random_satellites_move_as_dop853_does_between_reversals(seed: int) -> None:
     rng = np.random.default_rng(seed)
     moments = np.array([0.02, 0.03, 0.035]) * rng.uniform(0.9, 1.1)

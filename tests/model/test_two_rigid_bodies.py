@@ -257,6 +257,8 @@ def pair(degree: int = 4, **more: object) -> str:
     return scene(one.keys, other.keys, degree, place, velocity, rates=rates, q=q, q0=q0, **more)
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_both_bodies_exchanged_move_alike() -> None:
     one, other = (loaded(run_text(pair(swap=swap, time="end = 100\nsamples = 6"))) for swap in (0, 1))
     for first, second in ((one, other), (other, one)):
@@ -266,7 +268,8 @@ def test_both_bodies_exchanged_move_alike() -> None:
 
 
 @pytest.mark.parametrize(
-    ("precision", "most"), [("double", 1e-13), ("extended", 5e-17), ("quadruple", 1e-31)]
+    ("precision", "most"),
+    [("double", 1e-13), pytest.param("extended", 5e-17, marks=pytest.mark.slow), ("quadruple", 1e-31)],
 )
 def test_energy_and_momentum_stay(precision: str, most: float) -> None:
     turns = {"double": 20, "extended": 5, "quadruple": 0.2}[precision]

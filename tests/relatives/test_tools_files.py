@@ -205,6 +205,8 @@ def test_a_late_clock_is_found(seed: int) -> None:
         assert known.attitude_error.largest < 1e-8
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_an_experiments_own_times_are_no_unix_time() -> None:
     motion = Motion(np.random.default_rng(3))
     text = motion.text().replace("end = 8.0", "start = 1700000000\nend = 1700000008")

@@ -68,7 +68,7 @@ def test_a_killed_run_resumes_bit_for_bit(precision: str, tmp_path: Path) -> Non
         np.testing.assert_array_equal(one[name], other[name], name)
 
 
-@pytest.mark.parametrize("precision", cases(PRECISIONS, ["extended"]))
+@pytest.mark.parametrize("precision", cases(PRECISIONS, ["double"]))
 def test_no_bit_depends_on_which_samples_are_evaluated_together(precision: str) -> None:
     """A flight that begins with exact zeros in its attitude, where the working precision's last bits show."""
     given = precision if precision.isdigit() else f'"{precision}"'
