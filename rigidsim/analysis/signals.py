@@ -33,8 +33,8 @@ _IN_BODY = (
 )  # fmt: skip
 FIRST = (
     "polar_motion", "obliquity", "climatic_precession", "orbit_eccentricity", "precession", "node_longitude",
-    "libration", "yaw", "separation", "roll_pitch_yaw", "tilt", "precession_angle", "spin_angle",
-    "figure_axis", "momentum_axis", "andoyer_angles", "wobble_angle", "nutation_angle",
+    "libration", "yaw", "rigid_body_libration", "separation", "roll_pitch_yaw", "tilt", "precession_angle",
+    "spin_angle", "figure_axis", "momentum_axis", "andoyer_angles", "wobble_angle", "nutation_angle",
 )  # fmt: skip
 """Variables analysed by default; failing these the angular velocity, failing that all."""
 

@@ -15,9 +15,10 @@ from rigidsim.analysis.labels import Known
 from rigidsim.model.load import loads_of
 from rigidsim.model.loads.changing_tensor import Elasticity
 from rigidsim.model.loads.inner_bodies import FluidCore, core_of
+from rigidsim.model.loads.rigid_bodies import second_body
 from rigidsim.model.mechanics import carried_beside
 from rigidsim.model.sources import in_body_axes
-from rigidsim.scene.arithmetic import Vector, dot, norm
+from rigidsim.scene.arithmetic import Vector, cross, dot, norm
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.closed_form import find_closed_form
 from rigidsim.solve.closed_form.free import AsymmetricFree, SymmetricFree
@@ -27,6 +28,7 @@ _LONGITUDE, _AXIS = 0.08, 0.04
 """Relative amounts by which amplitude, eccentricity and inclination may change librations in longitude, and
 of the figure axis.
 """
+_ANOMALY = 0.05  # the same of the time from periapsis to periapsis
 _SYMMETRIC = 1e-12  # relative difference of two moments, below which a body is symmetric
 _SMALL = 1e-5  # relative change of the frequencies of modes by their own amplitude
 _TORQUES = 0.02  # the same of modes and of the spin by torques
@@ -64,13 +66,13 @@ def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
     if closed is not None:
         found = _of_motion(closed.motion)
         return [Known(k.name, mpmath.ldexp(k.value, -closed.scaling.time), 0.0, k.source) for k in found]
-    found = []
+    found = _of_pair(scene)
     loads = [load for load in loads_of(scene) if load.beside is None]
     elastic = any(isinstance(load, Elasticity) for load in loads)
     cored = [] if elastic or core_of(scene) is None else _of_rotation(scene)
     known = (Elasticity, FluidCore) if cored or elastic else ()
     if carried_beside([load for load in loads if not isinstance(load, known)]):
-        return []
+        return found
     orbits = [orbit for load in loads if (orbit := load.orbit) is not None]
     for number, orbit in enumerate(orbits, 1):
         found += _of_orbit(orbit, str(number) if len(orbits) > 1 else "")
@@ -113,6 +115,47 @@ def _of_motion(motion: Any) -> list[Known]:
             Known("precession", motion.sum_rate - motion.spin_rate, 0.0, f"{exact}: L / A"),
         ]
     return []
+
+
+def _of_pair(scene: Scene) -> list[Known]:
+    """Of two bodies: the way from periapsis to periapsis, and the free libration of the second body if it
+    turns with the orbit.
+
+    By the linearised equations with moments of second degree, about the circular orbit of the same angular
+    momentum in the equator of the first body, with k the sum of (C - A) / m of the first body (A its mean
+    moment) and (B + C - 2 A) / m of the second, D = m r^2 + C, S = 3 G m_A (B - A) / r^3, and x and y the
+    changes of distance and yaw:
+
+        x'' = -K x - (2 r n C / D) y',    C (1 - C / D) y'' = (2 m r n C / D) x' - S y.
+    """
+    second = second_body(scene)
+    if second is None or second.pair is None:
+        return []
+    pair, start, mass, root = second.pair, second.start, second.reduced_mass, scene.context.sqrt
+    low, high, polar = sorted(second.first.principal_moments)
+    a, b, c = sorted(second.body.principal_moments)
+    k = (polar - (low + high) / 2) / pair.masses[0] + (b + c - 2 * a) / pair.masses[1]
+    moment = norm(scene.context, cross(start.position, start.velocity))
+    bound = moment**2 / pair.strength
+    if bound**2 <= 6 * k:
+        return []
+    r = (bound + root(bound**2 - 6 * k)) / 2
+    n = moment / r**2
+    whole = mass * r**2 + c
+    stiff = pair.strength / r**3 * (-2 - 6 * k / r**2) - n**2 + 4 * mass * (r * n) ** 2 / whole
+    about = "linearised equations about a circular orbit"
+    turning = norm(scene.context, start.rates)
+    if not a < b or abs(turning / n - 1) > _IN_STEP:
+        return [Known("anomaly", root(stiff), _ANOMALY, f"{about}: from periapsis to periapsis")]
+    push, inertia = 3 * pair.constant * pair.masses[0] * (b - a) / r**3, c * (1 - c / whole)
+    half = (push + stiff * inertia + mass * (2 * r * n * c / whole) ** 2) / 2
+    apart = root(half**2 - inertia * stiff * push)
+    squares = sorted(((half + sign * apart) / inertia for sign in (1, -1)), key=lambda x: abs(x - stiff))
+    anomaly, libration = (root(square) for square in squares)
+    return [
+        Known("anomaly", anomaly, _ANOMALY, f"{about}: from periapsis to periapsis, forced libration"),
+        Known("libration", libration, _LONGITUDE, f"{about}: free libration"),
+    ]
 
 
 def _of_orbit(orbit: Any, number: str) -> list[Known]:

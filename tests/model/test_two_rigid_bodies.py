@@ -417,9 +417,34 @@ def test_after_the_impact_the_mean_period_is_that_of_an_independent_program() ->
     assert float(passed(1000 * np.pi)) / 500 / 3600 == pytest.approx(11.389939721, rel=1e-10)
     assert np.degrees(np.abs(data["yaw"]).max()) == pytest.approx(26.16, abs=0.02)
     [yaw] = rigidsim.analyse(data, variables=["yaw"], lines=2).signals
+    assert [line.label.text for line in yaw.lines] == ["libration", "anomaly"]
     for line, hours, degrees in zip(yaw.lines, (13.6956, 11.4935), (14.09, 11.48), strict=True):
         assert 2 * np.pi / abs(float(line.frequency)) / 3600 == pytest.approx(hours, abs=6e-5)
         assert np.degrees(float(line.amplitude)) == pytest.approx(degrees, abs=6e-3)
+
+
+def test_angles_of_the_pair_are_those_of_their_definitions() -> None:
+    start = "velocity = [0, 0.17, 0.02]\neuler_angles = [0.1, 0.2, 0.3]\nangular_velocity = [1e-5, 0, 1.4e-4]"
+    names = ["rigid_body_libration", "mutual_inclination", "mutual_node", "inclination_to_equator", "yaw"]
+    states = ["quaternion", *(f"rigid_body_{x}" for x in ("quaternion", "position", "velocity"))]
+    text = didymos(DIMORPHOS + start, time="end = 9e4\nsamples = 40", output=f"record = {names + states}")
+    data = loaded(run_text(text))
+    q, place, velocity = (data[name].values[:, 0] for name in states[1:])
+    normal, inwards = np.cross(place, velocity), -place / np.linalg.norm(place, axis=1)[:, None]
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    long, pole = matrices(q)[:, :, 0], matrices(data["quaternion"].values)[:, :, 2]
+    long *= np.sign(long[0] @ inwards[0])
+    dot = lambda a, b: (a * b).sum(axis=1)  # noqa: E731
+    in_plane = np.arctan2(dot(long, np.cross(normal, inwards)), dot(long, inwards))
+    meant = {
+        "rigid_body_libration": np.array([in_plane, np.arcsin(dot(long, normal))]).T,
+        "mutual_inclination": np.arctan2(np.hypot(*normal.T[:2]), normal[:, 2]),
+        "mutual_node": np.arctan2(normal[:, 0], -normal[:, 1]),
+        "inclination_to_equator": np.arccos(dot(normal, pole)),
+        "yaw": in_plane,
+    }
+    for name, values in meant.items():
+        np.testing.assert_allclose(np.exp(1j * data[name].values), np.exp(1j * values), rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("seed", seeds(1, 10))

@@ -17,6 +17,7 @@ from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model.frames import reference_plane
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.loads.rigid_bodies import SecondBody, second_body
 from rigidsim.model.mechanics import Mechanics
@@ -85,12 +86,28 @@ def _long_axis(m: Kinematics) -> Vector | None:
     return [-x for x in axis] if away > 0 else axis
 
 
-def _yaw(m: Mechanics) -> list[Angle]:
+def _libration(m: Mechanics) -> list[Angle]:
     states, axis = _states(m), m.carried(_long_axis(m))
-    inwards = [-x for x in unit(states.place)]
-    ahead = cross(unit(_moment(m)), inwards)
+    inwards, normal = [-x for x in unit(states.place)], unit(_moment(m))
     pointing = turned(states.matrix, m.fixed(axis))
-    return [Angle(along(pointing, ahead), along(pointing, inwards))]
+    x, y = along(pointing, inwards), along(pointing, cross(normal, inwards))
+    return [Angle(y, x), Angle(along(pointing, normal), hy.sqrt(x * x + y * y))]
+
+
+def _on_plane(m: Mechanics) -> list[Symbolic]:
+    return reference_plane(m).components(unit(_moment(m)))
+
+
+def _tilt(x: list[Symbolic]) -> Symbolic:
+    """Angle from the third axis, right to rounding next to it."""
+    return hy.atan2(hy.sqrt(x[0] * x[0] + x[1] * x[1]), x[2])
+
+
+def _to_equator(m: Mechanics) -> list[Symbolic]:
+    """The normal of the orbit against the figure axis of ``[body]``."""
+    pole, normal = m.figure_space, unit(_moment(m))
+    aside = cross(pole, normal)
+    return [hy.atan2(length(aside), along(pole, normal))]
 
 
 def _orbit_angle(m: Mechanics) -> list[Angle]:
@@ -132,6 +149,7 @@ class PairNames(NameProvider):
 
 
 _no_turn = lacking(_turns, "both bodies are on a line and don't go round; leave it out, or")
+_no_axis = lambda m: _no_turn(m) or (None if _long_axis(m) else "its two longest axes are equal")  # noqa: E731
 PAIR = (
     Observable(
         "rigid_body_quaternion", (*_EACH, "quaternion_component"), "1",
@@ -166,10 +184,32 @@ PAIR = (
         attributes=described_by("in the plane of the orbit at the start; turns counted"),
     ),
     continuous_angles(
-        "yaw", (), "angle of the second body's longest axis from the line to [body]", _yaw, needs=_NEEDED,
-        by_default=lambda m: True,
+        "yaw", (), "angle of the second body's longest axis from the line to [body]",
+        lambda m: _libration(m)[:1], needs=_NEEDED, by_default=lambda m: True, absent=_no_axis,
         attributes=described_by("in the plane of the present orbit, about its normal r x v; turns counted"),
-        absent=lambda m: _no_turn(m) or (None if _long_axis(m) else "its two longest axes are equal"),
+    ),
+    continuous_angles(
+        "rigid_body_libration", ("libration_angle",),
+        "libration of the second body's longest axis from the line to [body]", _libration,
+        needs=_NEEDED, absent=_no_axis,
+        attributes=described_by("in the plane of the present orbit, as yaw; out of it, towards r x v"),
+    ),
+    Observable(
+        "mutual_inclination", (), "rad", "inclination of the orbit of both bodies",
+        lambda m: [_tilt(_on_plane(m))], needs=(*_NEEDED, "plane"), by_default=only_when_named,
+        absent=_no_turn, attributes=described_by("angle of r x v from the plane's normal", plane=True),
+    ),
+    continuous_angles(
+        "mutual_node", (), "longitude of the ascending node of the orbit of both bodies",
+        lambda m: [Angle(_on_plane(m)[0], -_on_plane(m)[1])], needs=(*_NEEDED, "plane"), absent=_no_turn,
+        attributes=described_by(
+            "where the second body rises through the plane; turns counted; NaN in the plane", plane=True
+        ),
+    ),
+    Observable(
+        "inclination_to_equator", (), "rad", "inclination of the orbit to the equator of [body]", _to_equator,
+        needs=_NEEDED, by_default=only_when_named, absent=_no_turn,
+        attributes=described_by("angle of r x v from the figure axis of [body]", figure=True),
     ),
     Observable(
         "rigid_body_quaternion_norm", _EACH, "1", "norm of each further rigid body's attitude quaternion",
