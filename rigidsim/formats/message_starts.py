@@ -5,7 +5,7 @@ against a local frame of the orbit (LVLH, LVLH_ROTATING, ...) implies ``relative
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from rigidsim.scene.attitude import unit_quaternion
 from rigidsim.scene.registry import MESSAGES
 from rigidsim.scene.schema import LOCAL_FRAMES
 from rigidsim.scene.starts import STARTS, InitialRotation, refusal
+from rigidsim.scene.text_tables import text_of
 
 _LATE = 1e-6  # s, by which the start may miss the message's date
 
@@ -39,10 +40,7 @@ def read_apm(name: str, text: str) -> Trajectory:
 
 def _start(scene: Any) -> InitialRotation:
     table, context = scene.config.initial, scene.context
-    what = f'given "{table.apm}", but this config was given as text, without files next to it; put the '
-    what += f'message into [tables."{table.apm}"] text'
-    ensure(table.apm in scene.config.texts, refusal("apm", what))
-    found = read_apm(table.apm, scene.config.texts[table.apm])
+    found = read_apm(table.apm, text_of(scene.config.texts, table.apm, partial(refusal, "apm")))
     ahead = float(scene.epoch.since(found.epochs[0])) + float(scene.start)
     what = f"is of {found.epochs[0]}, {abs(ahead):.6g} s {'before' if ahead > 0 else 'after'} the start; set "
     ensure(abs(ahead) <= _LATE, refusal("apm", f"{what}[time] epoch and start so that the run starts then"))

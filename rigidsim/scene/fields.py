@@ -332,9 +332,14 @@ class OneOf:
     more: tuple[str, ...] = ()
     of_scene: Callable[[Mapping[str, Any]], Iterable[Any]] | None = None
 
+    @property
+    def words(self) -> list[str]:
+        """Names that don't follow from the config."""
+        return [*self.more, *self.names]
+
     def _known(self, value: Any, info: Any) -> str:
         own = self.of_scene(info.context or {}) if self.of_scene else ()
-        allowed = [*self.more, *self.names, *(name for name in own if isinstance(name, str))]
+        allowed = [*self.words, *(name for name in own if isinstance(name, str))]
         if isinstance(value, str) and value in allowed:
             return value
         word = value if isinstance(value, str) else shown(value)
@@ -346,8 +351,8 @@ class OneOf:
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
         if self.of_scene:
-            return {"anyOf": [{"enum": [*self.more, *self.names]}, {"type": "string"}]}
-        return {"type": "string", "enum": [*self.more, *self.names]}
+            return {"anyOf": [{"enum": self.words}, {"type": "string"}]}
+        return {"type": "string", "enum": self.words}
 
 
 @dataclass(frozen=True, eq=False)

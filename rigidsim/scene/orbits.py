@@ -5,12 +5,12 @@ laws or by a table.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import Field, StrictStr, Tag
 
-from rigidsim.errors import ensure
+from rigidsim.errors import ensure, required
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import (
     WORKING_BITS,
@@ -41,7 +41,7 @@ from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.registry import LoadFields, Setting
 from rigidsim.scene.space_axes import ECLIPTIC, obliquity, to_ecliptic, to_equator
 from rigidsim.scene.swept import Swept, SweptExact, Untraceable
-from rigidsim.scene.text_tables import TableError
+from rigidsim.scene.text_tables import TableError, text_of
 from rigidsim.scene.validation_messages import nearest
 
 TableFrame = Literal["HCI", "ecliptic J2000", "EME2000", "ICRF", "GCRF"]
@@ -227,7 +227,7 @@ def attracting_body(orbit: Orbit, around: Setting) -> int:
     ensure(orbit.body in names, around.fault("orbit.body", what))
     found = names.index(str(orbit.body))
     what = f'given "{orbit.body}", which is the body itself; name another'
-    ensure(found != around.carried_bodies.host, around.fault("orbit.body", what))
+    ensure(found != required(around.bodies).host, around.fault("orbit.body", what))
     return found
 
 
@@ -355,9 +355,7 @@ def resolve_tabulated_orbit(fields: Elements, strength: Any | None, around: Sett
     if isinstance(strength, Swept) or any(isinstance(value, SweptExact) for _, value in given):
         raise Untraceable("an orbit by a table depends on it")
     place = f"{fields.key}.table"
-    what = f'given "{name}", but this config was given as text, without files next to it; put the CSV into '
-    what += f'[tables."{name}"] text (there now: {", ".join(texts) or "none"})'
-    ensure(name in texts, around.fault(place, what))
+    text = text_of(texts, name, partial(around.fault, place))
     parts = None if strength is None else strength._mpf_
     constants = tuple(
         (key, tuple(value) if isinstance(value, list) else value) for key, value in given if value is not None
@@ -367,7 +365,7 @@ def resolve_tabulated_orbit(fields: Elements, strength: Any | None, around: Sett
     ensure(not named or around.axes is not None, around.fault(f"{fields.key}.frame", what))
     try:
         orbit = _tabulated_orbit(
-            name, texts[name], context.prec, constants, parts,
+            name, text, context.prec, constants, parts,
             opposite=fields.opposite, narrow=bits_in_use(context) <= WORKING_BITS["double"], axes=around.axes,
         )  # fmt: skip
     except TableError as error:

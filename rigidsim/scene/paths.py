@@ -7,13 +7,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import groupby
 from types import NoneType, UnionType
-from typing import Annotated, Any, Self, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Self, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.fields import Exactly, InUnit, Range
+from rigidsim.scene.fields import Exactly, InUnit, OneOf, OrWord, Range
 from rigidsim.scene.validation_messages import nearest, shown
 
 ARRAYS_OF_TABLES = ("loads", "bodies", "rigid_bodies", "rotors", "states", "events", "fit.data")
@@ -26,13 +26,14 @@ _PART = re.compile(r"""\s*(?:"([^"\n]+)"|'([^'\n]+)'|([^\[\].\"']+))((?:\[\d{1,9
 
 @dataclass(frozen=True)
 class Taken:
-    """What a key takes: the SI unit of its numbers ("1" for none), their count (0 for a plain one), and the
-    ranges that each is in.
+    """What a key takes: the SI unit of its numbers ("1" for none), their count (0 for a plain one), the
+    ranges that each is in, and words.
     """
 
     unit: str
     length: int
     ranges: list[Range]
+    words: list[str]
 
 
 @dataclass(frozen=True)
@@ -160,7 +161,10 @@ class Path:
         counts = [x.count for _, about in kinds for x in about if isinstance(x, Exactly)]
         counts += [n for x in extra if isinstance(n := x.get("minItems"), int) and n == x.get("maxItems")]
         ranges = [x for _, about in kinds for x in about if isinstance(x, Range)]
-        return Taken(unit or _unit(kinds), next(iter(counts), 0), ranges)
+        words = [word for kind, _ in kinds for word in _words(kind)]
+        named = (x for _, about in kinds for x in about if isinstance(x, OneOf | OrWord))
+        words += [word for x in named for word in x.words]
+        return Taken(unit or _unit(kinds), next(iter(counts), 0), ranges, words)
 
     def keys(self, model: type[BaseModel], tables: Mapping[str, Any]) -> list[str]:
         """The keys of the table there; none where there is no table."""
@@ -236,6 +240,11 @@ def _unit(kinds: list[_Kind]) -> str:
             if inner != "1":
                 return inner
     return "1"
+
+
+def _words(kind: Any) -> tuple[str, ...]:
+    """Words that a type consists of."""
+    return ("true", "false") if kind is bool else get_args(kind) if get_origin(kind) is Literal else ()
 
 
 def _entry(tree: Any, step: str | int) -> Any:

@@ -108,12 +108,6 @@ class Setting:
     number: int = 0
 
     @property
-    def carried_bodies(self) -> PointMasses:
-        """The point masses, which the caller knows to exist."""
-        assert self.bodies is not None
-        return self.bodies
-
-    @property
     def free_flight(self) -> bool:
         """Whether the body moves with six degrees of freedom."""
         return self.position is not None

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar
 
@@ -139,13 +139,11 @@ def _listed(table: Time, context: Any, texts: Mapping[str, str]) -> list[Fractio
     assert given is not None
     if not isinstance(given, str):
         return [time.fraction(context) for time in given]
-    from rigidsim.scene.text_tables import times_in  # which few configs need
+    from rigidsim.scene.text_tables import text_of, times_in  # which few configs need
 
-    if given not in texts:
-        what = "but this config was given as text, without files next to it; put the table's text into "
-        raise _fail("times", f'given "{given}", {what}[tables."{given}"] text')
+    text = text_of(texts, given, partial(_fail, "times"))
     try:
-        return times_in(texts[given], context, table.epoch)
+        return times_in(text, context, table.epoch)
     except ValueError as error:
         raise _fail("times", f'given "{given}": {error}') from None
 

@@ -718,18 +718,11 @@ def _check_singular(scene: Scene, values: dict[str, Any]) -> list[Problem]:
 
 
 def _check(expression: Expression, values: dict[str, Any], context: Any) -> list[Problem]:
-    try:
-        evaluate(expression, values, context)
-    except ExpressionError as error:
-        names = [name for name in values if name in names_used(expression)]
-        given = ", ".join(f"{name} = {context.nstr(values[name], 8)}" for name in names)
-        return [
-            Problem(
-                expression.where,
-                f"no finite value at the start ({given}); start elsewhere or rewrite it: {error}",
-            )
-        ]
-    return []
+    error = _refusal(expression, values, context)
+    names = [name for name in values if name in names_used(expression)]
+    given = ", ".join(f"{name} = {context.nstr(values[name], 8)}" for name in names if error)
+    what = f"no finite value at the start ({given}); start elsewhere or rewrite it: {error}"
+    return [Problem(expression.where, what)] if error else []
 
 
 def _check_signs(scene: Scene, values: dict[str, Any]) -> list[Problem]:
@@ -750,23 +743,24 @@ def _check_span(expression: Expression, scene: Scene) -> list[Problem]:
     problems, context = [], scene.context
     for part in _functions_of_time(expression):
         span = scene.end - scene.start
-        tried = [_refusal(part, scene.start + span * n / _TIMES, context) for n in range(_TIMES + 1)]
+        tried = [_refusal(part, {"t": scene.start + span * n / _TIMES}, context) for n in range(_TIMES + 1)]
         if tried[0] is not None or None in tried[1:]:
             continue
         last, beyond = scene.start, scene.start + span / _TIMES
         for _ in range(context.prec):
             middle = (last + beyond) / 2
-            last, beyond = (middle, beyond) if _refusal(part, middle, context) is None else (last, middle)
+            passed = _refusal(part, {"t": middle}, context)
+            last, beyond = (middle, beyond) if passed is None else (last, middle)
         what = f"no finite value after t = {context.nstr(last, 8)} s, but the run ends at "
         what += f"{context.nstr(scene.end, 8)} s; rewrite it, or end the run before: {tried[1]}"
         problems.append(Problem(expression.where, what))
     return problems
 
 
-def _refusal(expression: Expression, time: Any, context: Any) -> ExpressionError | None:
-    """Why a function of time alone has no value at a time; None if it has one."""
+def _refusal(expression: Expression, values: dict[str, Any], context: Any) -> ExpressionError | None:
+    """Why an expression has no value; None if it has one."""
     try:
-        evaluate(expression, {"t": time}, context)
+        evaluate(expression, values, context)
     except ExpressionError as error:
         return error
     return None

@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 from rigidsim.scene.arithmetic import Matrix, Vector
 from rigidsim.scene.epochs import Epoch
-from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.exact import ExactNumber, rounded
 
 SpaceAxes = Literal["EME2000", "ICRF", "GCRF", "ecliptic J2000"]
 ECLIPTIC: SpaceAxes = "ecliptic J2000"
@@ -76,7 +76,7 @@ _ANGLE, _TURNS = Fraction("0.7790572732640"), Fraction("1.00273781191135448")
 
 def rotation_rate(context: Any) -> Any:
     """The rate of the rotation angle, rad/s (mpf)."""
-    return 2 * context.pi * _number(_TURNS / 86400, context)
+    return 2 * context.pi * rounded(_TURNS / 86400, context)
 
 
 def earth_axes(epoch: Epoch, axes: str, context: Any) -> Matrix:
@@ -95,10 +95,10 @@ def earth_axes(epoch: Epoch, axes: str, context: Any) -> Matrix:
 
     def angle(coefficients: Sequence[str]) -> Any:
         total = sum((Fraction(x) * centuries**n for n, x in enumerate(coefficients)), Fraction(0))
-        return _number(total / (3600 * 180), context) * context.pi
+        return rounded(total / (3600 * 180), context) * context.pi
 
     turned = (_ANGLE + _TURNS * days) % 1
-    meridian = 2 * context.pi * _number(turned, context) + angle(_PAST_ANGLE) - angle(_Z)
+    meridian = 2 * context.pi * rounded(turned, context) + angle(_PAST_ANGLE) - angle(_Z)
     matrix = [[context.mpf(i == k) for k in range(3)] for i in range(3)]
     for about, by in ((2, -angle(_ZETA)), (1, angle(_THETA)), (2, meridian)):
         matrix = _turned(matrix, about, by, context)
@@ -116,7 +116,3 @@ def _turned(matrix: Matrix, about: int, angle: Any, context: Any) -> Matrix:
     found[first] = [c * a + s * b for a, b in pairs]
     found[second] = [c * b - s * a for a, b in pairs]
     return found
-
-
-def _number(value: Fraction, context: Any) -> Any:
-    return ExactNumber(value).at(context)

@@ -37,6 +37,16 @@ class TableError(ValueError):
     """A table that can't be read; the text says where and what is allowed."""
 
 
+def text_of(texts: Mapping[str, str], name: str, fault: Callable[[str], Exception]) -> str:
+    """The text of a file next to the config that is named in it; ``fault`` is raised without one."""
+    if name not in texts:
+        what = (
+            f'given "{name}", but this config was given as text, without files next to it; put the file\'s '
+        )
+        raise fault(f'{what}text into [tables."{name}"] text (there now: {", ".join(texts) or "none"})')
+    return texts[name]
+
+
 @dataclass(frozen=True)
 class TextTable:
     """A text of rows of cells.

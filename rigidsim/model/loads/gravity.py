@@ -938,7 +938,7 @@ class GravityGradient(SceneLoad):
                     "gravitational_parameter", "given with orbit.body, which determines it; remove it"
                 ),
             )
-            masses, number = around.carried_bodies, attracting_body(fields.orbit, around)
+            masses, number = required(around.bodies), attracting_body(fields.orbit, around)
             ensure(
                 masses.host is not None or not masses.full,
                 around.fault(
@@ -1045,7 +1045,7 @@ def _flown_by_mass(orbit: Orbit, around: Setting) -> Attraction:
         orbit.body is not None,
         around.fault("orbit", "given without body; the name of one of [[bodies]] is allowed"),
     )
-    number, masses = attracting_body(orbit, around), around.carried_bodies
+    number, masses = attracting_body(orbit, around), required(around.bodies)
     ensure(
         masses.host is None,
         around.fault(

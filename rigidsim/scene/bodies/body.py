@@ -83,6 +83,7 @@ from rigidsim.scene.fields import (
 from rigidsim.scene.paths import numbers
 from rigidsim.scene.rotations import quaternion_of
 from rigidsim.scene.swept import plain
+from rigidsim.scene.text_tables import text_of
 from rigidsim.scene.validation_messages import shown
 
 Area = Annotated[ExactNumber, InUnit("m^2")]
@@ -746,15 +747,12 @@ class _Pieces:
         def fault(what: str) -> ConfigError:
             return refusal(f"{place}file", f'given "{name}", {what}')
 
-        what = (
-            "but this config was given as text, without files next to it; put the file's text into [tables.\""
-        )
-        ensure(name in self.texts, fault(f'{what}{name}"] text'))
+        text = text_of(self.texts, name, lambda what: refusal(f"{place}file", what))
         if not is_mesh(name):
             beside = [key for key in ("mass", "density", "unit") if getattr(table, key) is not None]
             ensure(not beside, fault(f"which has its own mass and units; remove {' and '.join(beside)}"))
             try:
-                found = Part.model_validate(link_inertia(self.texts[name], table.link, fault))
+                found = Part.model_validate(link_inertia(text, table.link, fault))
             except ValidationError as error:
                 first = error.errors()[0]
                 raise fault(f"whose <inertial> has for {first['loc'][0]}: {first['msg']}") from None
@@ -762,7 +760,7 @@ class _Pieces:
         ensure(table.link is None, fault("which is a mesh without links; remove link"))
         what = f"given {'both' if table.mass else 'neither'}; a mesh needs one of mass and density"
         ensure((table.mass is None) != (table.density is None), refusal(f"{place}density", what))
-        read, unit = mesh_moments(self.texts[name]), self._unit(table, place)
+        read, unit = mesh_moments(text), self._unit(table, place)
         volume = context.mpf(read["volume"]) * unit**3
         density = (
             table.density.at(context) if table.density is not None else self._mass(table, place) / volume

@@ -31,6 +31,7 @@ from rigidsim.scene.exact import parse_number, rounded
 from rigidsim.scene.fields import ConfigTable, Dimensionless, Metre, Positive, excludes, one_of, refuse
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.swept import plain
+from rigidsim.scene.text_tables import as_number, text_of
 from rigidsim.scene.validation_messages import shown
 
 WHERE = "[body] gravity_field"
@@ -169,11 +170,8 @@ def gravity_field_of(
 
 def _of_file(name: str, body: Any, context: Any, texts: Mapping[str, str], degree: int) -> GravityField:
     given = f'given "{name}", '
-    what = "but this config was given as text, without files next to it; put the file's text into [tables."
-    what += f'"{name}"] text (there now: {", ".join(texts) or "none"})'
-    ensure(name in texts, _fault(given + what, " file"))
     try:
-        read = read_field(texts[name], degree)
+        read = read_field(text_of(texts, name, lambda what: _fault(what, " file")), degree)
     except FieldFileError as error:
         what = f"has in {error}" if str(error).startswith("line ") else str(error)
         raise _fault(f"{given}which {what}", " file") from None
@@ -308,7 +306,7 @@ def cut(lines: Iterable[str], degree: int) -> str:
     for line in lines:
         words = line.replace(",", " ").split()
         if icgem is None and words:
-            icgem = head = not _is_number(words[0])
+            icgem = head = math.isnan(as_number(words[0].translate(_FORTRAN)))
             kept.append(line)
         elif head:
             kept.append(line)
@@ -351,7 +349,9 @@ def _shadr(lines: list[tuple[int, str]]) -> tuple[FieldFile, Iterator[_Row]]:
     what = f"is neither ICGEM (a header up to {HEAD_ENDS}) nor SHADR (a line of radius, G M, its error, "
     what += "degree, order, normalization, longitude, latitude)"
     head = rows[0][1] if rows else []
-    ensure(len(head) >= 8 and all(_is_number(x) for x in head[:6]), FieldFileError(what))
+    ensure(len(head) >= 8 and "" not in head[:6], FieldFileError(what))
+    numbers = [as_number(x.translate(_FORTRAN)) for x in head[:6]]
+    ensure(all(map(math.isfinite, numbers)), FieldFileError(what))
     radius, strength, _, degree, order, normalization, longitude, latitude = head[:8]
     what = f"has the normalization state {normalization}; 0 (none) and 1 (full) are read"
     ensure(_number(normalization) in (0, 1), FieldFileError(what))
@@ -382,14 +382,6 @@ def _add_row(found: FieldFile, where: str, key: str, words: list[str], degree: i
     ensure(m or s == 0, FieldFileError(f"{where}S of order 0 is {float(s):g}; it is zero"))
     ensure((n, m) not in found.rows, FieldFileError(f"{where}degree {n}, order {m} comes twice"))
     found.rows[n, m] = (c, s)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        _number(text)
-    except FieldFileError:
-        return False
-    return True
 
 
 def _number(text: str, where: str = "") -> Fraction:
