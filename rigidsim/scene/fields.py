@@ -74,11 +74,8 @@ def excludes(key: str, *others: str) -> Rule:
 
     def rule(table: Any) -> str:
         found = _given(table, others) if _given(table, [key]) else []
-        return (
-            f"given {' and '.join(found)} with {key}, which determines it; remove one of them"
-            if found
-            else ""
-        )
+        said = f"given {' and '.join(found)} with {key}, which determines it; remove one of them"
+        return said if found else ""
 
     return rule
 

@@ -21,7 +21,7 @@ from rigidsim.scene.fields import (
     excludes,
 )
 from rigidsim.scene.kepler import Ellipse, combined, plane_vectors
-from rigidsim.scene.kernels.ephemeris import Ephemeris
+from rigidsim.scene.kernels.reading import Ephemeris
 from rigidsim.scene.validation_messages import nearest, shown
 
 GRAVITATIONAL_CONSTANT = "6.67430e-11"

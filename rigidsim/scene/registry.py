@@ -23,8 +23,7 @@ from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import Expression, ExpressionError
 from rigidsim.scene.fields import ConfigTable, Metre, Positive, VariableName
 from rigidsim.scene.frame import Figure
-from rigidsim.scene.kernels.ephemeris import Ephemeris
-from rigidsim.scene.kernels.reading import RelativeEphemeris
+from rigidsim.scene.kernels.reading import Ephemeris, RelativeEphemeris
 from rigidsim.scene.point_masses import PointMasses
 
 

@@ -38,7 +38,7 @@ from rigidsim.scene.expressions.tree import (
     states_read,
 )
 from rigidsim.scene.frame import figure_of, reference_normal
-from rigidsim.scene.kernels.ephemeris import host_of, resolve_ephemeris
+from rigidsim.scene.kernels.reading import host_of, resolve_ephemeris
 from rigidsim.scene.point_masses import resolve_point_masses
 from rigidsim.scene.registry import LOADS, BroughtState, SceneLoad, Setting
 from rigidsim.scene.sample_times import SampleTimes, sample_times

@@ -83,7 +83,7 @@ from rigidsim.scene.fields import (
 )
 from rigidsim.scene.frame import Frame
 from rigidsim.scene.kepler import Ellipse
-from rigidsim.scene.kernels.ephemeris import EphemerisTable
+from rigidsim.scene.kernels.reading import EphemerisTable
 from rigidsim.scene.paths import ARRAYS_OF_TABLES, Path
 from rigidsim.scene.point_masses import PointMassBody
 from rigidsim.scene.registry import LOADS, MESSAGES, OBSERVABLES, BroughtState, LoadFields

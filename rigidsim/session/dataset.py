@@ -12,7 +12,7 @@ import numpy as np
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.orbits import sights_of
 from rigidsim.model.system import Invariant
-from rigidsim.scene.kernels.ephemeris import date_of
+from rigidsim.scene.kernels.reading import date_of
 from rigidsim.scene.scene import Scene
 from rigidsim.session.dates import Dates
 from rigidsim.solve.assembly import Assembly

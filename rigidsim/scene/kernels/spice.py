@@ -23,8 +23,7 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.epochs import Epoch
-from rigidsim.scene.kernels.ephemeris import date_of
-from rigidsim.scene.kernels.reading import KernelError, digest_of, find_file, is_path
+from rigidsim.scene.kernels.reading import KernelError, date_of, digest_of, find_file, is_path
 from rigidsim.scene.space_axes import CELESTIAL, ECLIPTIC, obliquity, to_ecliptic
 from rigidsim.scene.validation_messages import nearest, shown
 
