@@ -258,8 +258,7 @@ def inline(value: Any, where: str = "value", depth: int = 0) -> str:
     if isinstance(plain, bool | int):
         return str(plain).lower()
     if isinstance(plain, Decimal):
-        fault = Problem(where, f"given {plain}; finite numbers are allowed")
-        ensure(plain.is_finite(), ConfigError(fault))
+        ensure(plain.is_finite(), ConfigError(Problem(where, f"given {plain}; finite numbers are allowed")))
         text = str(plain).lower().replace("e+", "e")
         return text if "." in text or "e" in text else f"{text}.0"
     if isinstance(plain, Mapping):
@@ -625,8 +624,7 @@ def _table_sections(config: Config, folder: Path) -> str:
                 digest, _ = _long_text(path.absolute(), status.st_size, status.st_mtime_ns)
                 found[name] = f'{begin}sha256 = "{digest}"\n'
                 continue
-            text = _text(where, name, path, read).rstrip()
-            found[name] = f"{begin}text = '''\n{text}\n'''\n"
+            found[name] = f"{begin}text = '''\n{_text(where, name, path, read).rstrip()}\n'''\n"
     return "".join(found.values())
 
 

@@ -101,8 +101,7 @@ def check_ways(config: Config) -> None:
     ways = [_given(table, ATTITUDES), _given(table, RATES)]
     for way, what in zip(ways, ("attitude", "start of the rates"), strict=True):
         for other in way[1:]:
-            text = f"given with {way[0]}; only one {what} is allowed: remove one of them"
-            raise refusal(other, text)
+            raise refusal(other, f"given with {way[0]}; only one {what} is allowed: remove one of them")
         for key in way if found is not None else ():
             text = f'given with equilibrium = "{found}", which finds it; remove one of them'
             ensure(key in _BESIDE_FOUND.get(str(found), ("spin_period",)), refusal(key, text))

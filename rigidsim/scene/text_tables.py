@@ -110,9 +110,8 @@ class TextTable:
     @cached_property
     def units(self) -> dict[str, str]:
         """Units by the names of columns, as far as these say them; for times also unknown ones."""
-        said = {name: name_and_unit(name) for name in self.names}
         return {
-            name: unit for name, (bare, unit) in said.items()
+            name: unit for name, (bare, unit) in ({name: name_and_unit(name) for name in self.names}).items()
             if unit and (is_unit(unit) or bare.lower() in TIMES)
         }  # fmt: skip
 

@@ -227,8 +227,7 @@ def _mjcf(inertial: Element) -> dict[str, Any]:
 
 def _numbers(given: Mapping[str, str], key: str, count: int, otherwise: str | None = None) -> list[str]:
     """Texts of an attribute's numbers."""
-    text = given[key] if otherwise is None else given.get(key, otherwise)
-    found = text.split()
+    found = (given[key] if otherwise is None else given.get(key, otherwise)).split()
     if len(found) != count:
         raise ValueError(f"{len(found)} numbers in {key}, where {count} belong")
     return found

@@ -156,8 +156,7 @@ def gravity_field_of(
     Raises:
         ConfigError: it contradicts the rest of the body.
     """
-    what = "given, but [body] mass is missing, by which it attracts; give it"
-    ensure(body.mass is not None, _fault(what))
+    ensure(body.mass is not None, _fault("given, but [body] mass is missing, by which it attracts; give it"))
     what = "given, but the body turns about another point than its centre of mass, from which the harmonics "
     what += "count; remove center_of_mass or reference"
     ensure(all(x == 0 for x in body.center_of_mass), _fault(what))
@@ -329,16 +328,13 @@ def _icgem(lines: list[tuple[int, str]]) -> tuple[FieldFile, Iterator[_Row]]:
         if value and head.setdefault(key, value) != value and key in _DECIDING:
             raise FieldFileError(f"has the {key} {head[key]} and {value}; one is allowed")
     product = head.get("product_type", "gravity_field")
-    what = f"is of product_type {product}; gravity_field is read"
-    ensure(product == "gravity_field", FieldFileError(what))
+    ensure(product == "gravity_field", FieldFileError(f"is of product_type {product}; gravity_field is read"))
     strength = next((key for key in _STRENGTH if key in head), _STRENGTH[0])
     for key in ("radius", "max_degree", strength):
         ensure(key in head, FieldFileError(f"has no {key} before {HEAD_ENDS}"))
     norm, degree = head.get("norm", "fully_normalized"), head["max_degree"]  # the format's own default
-    what = f"has norm {norm}; {' and '.join(_NORMALIZED)} are read"
-    ensure(norm in _NORMALIZED, FieldFileError(what))
-    what = f"has max_degree {degree}; a whole number is expected"
-    ensure(_WHOLE.fullmatch(degree), FieldFileError(what))
+    ensure(norm in _NORMALIZED, FieldFileError(f"has norm {norm}; {' and '.join(_NORMALIZED)} are read"))
+    ensure(_WHOLE.fullmatch(degree), FieldFileError(f"has max_degree {degree}; a whole number is expected"))
     numbers = _positive(head["radius"], "radius"), _positive(head[strength], strength)
     found = FieldFile(*numbers, _NORMALIZED[norm], int(degree))
     return found, ((number, words[0], words[1:]) for number, words in rows[end + 1 :] if words)
@@ -358,8 +354,7 @@ def _shadr(lines: list[tuple[int, str]]) -> tuple[FieldFile, Iterator[_Row]]:
     for name, given in (("longitude", longitude), ("latitude", latitude)):
         what = f"refers to a {name} of {given} deg; fields that refer to 0 are read"
         ensure(not given or _number(given, f"has the {name} ") == 0, FieldFileError(what))
-    what = f"has the degree {degree}; a whole number is expected"
-    ensure(_WHOLE.fullmatch(degree), FieldFileError(what))
+    ensure(_WHOLE.fullmatch(degree), FieldFileError(f"has the degree {degree}; a whole number is expected"))
     what = f"goes to order {order} of degree {degree} only; whole degrees are read"
     ensure(_number(order) >= _number(degree), FieldFileError(what))
     size, mass = 1000 * _positive(radius, "radius"), 10**9 * _positive(strength, "G M")
@@ -369,8 +364,7 @@ def _shadr(lines: list[tuple[int, str]]) -> tuple[FieldFile, Iterator[_Row]]:
 
 def _add_row(found: FieldFile, where: str, key: str, words: list[str], degree: int) -> None:
     what = "time-variable terms aren't read" if key in ("gfct", "trnd", "dot", "asin", "acos") else ""
-    what = f"{where}a row {key}; {what or 'rows gfc are expected'}"
-    ensure(key in ("", "gfc"), FieldFileError(what))
+    ensure(key in ("", "gfc"), FieldFileError(f"{where}a row {key}; {what or 'rows gfc are expected'}"))
     what = f"{where}degree, order, C and S are expected, given {' '.join(words)[:60]}"
     whole = len(words) >= 4 and all(_WHOLE.fullmatch(x) for x in words[:2])
     ensure(whole, FieldFileError(what))

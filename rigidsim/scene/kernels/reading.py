@@ -536,5 +536,4 @@ def date_of(seconds: Fraction | int) -> str:
         whole = J2000.after(Decimal(round(seconds)))
     except (ValueError, OverflowError):
         return f"JD {float(J2000_DATE + Fraction(seconds) / DAY):.1f}"
-    text = whole.calendar()
-    return text.removesuffix("T00:00:00")
+    return whole.calendar().removesuffix("T00:00:00")
