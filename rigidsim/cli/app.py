@@ -35,6 +35,10 @@ app = typer.Typer(
 def main() -> None:
     """Entry point of ``rigidsim``."""
     gc.disable()  # modules are no garbage: looking for it takes a tenth of the time of loading them
+    if not any(given.startswith("--scheduler") for given in sys.argv):
+        # where they are installed, xarray loads them in half a second to see that no array is one of theirs
+        for unused in ("dask", "pint"):
+            sys.modules.setdefault(unused, None)  # type: ignore[arg-type]
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # a file's name may be no text
     try:
