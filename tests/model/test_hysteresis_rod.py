@@ -45,6 +45,38 @@ def test_a_rod_in_a_strong_field_goes_round_its_limiting_loop() -> None:
     assert lost == pytest.approx(1e-6 * area, rel=5e-3)
 
 
+LOOP = "1e-6/mu0*0.05/pi*atan(steep*(bx/mu0 - 12*sign(dbx)))"  # Gerhardt & Palo 2010, times volume / mu_0
+
+
+@pytest.mark.parametrize("field", [20, *(pytest.param(x, marks=pytest.mark.campaign) for x in (10, 50))])
+def test_what_a_minor_loop_loses_beside_the_loop_of_a_published_decay(field: float) -> None:
+    """A wheel loses the volume times the loop's area in each turn: with this model, and with a rod that jumps
+    between the branches of the limiting loop.
+    """
+    k = np.tan(np.pi * 0.004 / 0.05) / 12
+    b, lost = 0.05 / np.pi * np.arctan(k * field), 0.0
+    for n in range(16):  # along H alone, half a cycle after the other
+        way = 1 if n % 2 else -1
+
+        def along(h: float, y: np.ndarray, way: int = way) -> list[float]:
+            change = slope(y[0], h, way, **dict(zip(("hc", "br", "bs"), ROD.values(), strict=True))) * way
+            return [change, h * change]
+
+        done = solve_ivp(along, [-way * field, way * field], [b, 0], rtol=1e-11, atol=1e-15).y
+        b, lost = done[0, -1], done[1, -1] + (lost if n == 15 else 0)
+    jumping = quad(lambda x: np.arctan(k * (x + 12)) - np.arctan(k * (x - 12)), -field, field)[0] * 0.05 / np.pi
+    plain = f'kind = "magnetic_dipole"\nmoment = [0, 0, 0]\nfield = [{field * MU_0}, 0, 0]'
+    jumps = plain.replace("[0, 0, 0]", f'["{LOOP}", 0, 0]')
+    for loads, known in (([plain, rod()], lost), ([jumps], jumping)):
+        text = config(
+            "principal_moments = [1, 1, 2]", "angular_velocity = [0, 0, 1]", loads=loads,
+            time=f"end = {16 * np.pi!r}\nsamples = 9",
+        )  # fmt: skip
+        text += f"[parameters]\nsteep = {float(k)!r}\nmu0 = {MU_0!r}\n"
+        energy = loaded(run_text(text)).energy.values
+        assert energy[-2] - energy[-1] == pytest.approx(1e-6 * known, rel=2e-5)
+
+
 @pytest.mark.parametrize("seed", seeds(1, 30))
 def test_random_satellites_move_as_dop853_does_between_reversals(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -803,7 +803,7 @@ def test_one_segment_of_a_message_is_fitted_and_shown(tmp_path: Path) -> None:
     fit = '[fit]\nparameters = ["initial.attitude"]\n[[fit.data]]\nfile = "top.aem"\nsegment = "1"\n'
     (tmp_path / "top.toml").write_text(scene + fit + 'observable = "quaternion"\nsigma = 1e-6\n')
     with unoptimised_code():
-        [data] = rigidsim.fit(rigidsim.load(tmp_path / "top.toml"), out=tmp_path / "fits").data
+        [data] = rigidsim.fit(rigidsim.load(tmp_path / "top.toml")).data
     assert (data.rows, data.rms < 1e-9) == (13, True)
     assert open_any(f"{path}#2024-03-01T00:00:01").dataset.sizes["time"] == 13
     for name, message in {

@@ -34,7 +34,7 @@ _MESHES = (".obj", ".off", ".ply", ".stl")
 _XML = (".urdf", ".xml", ".mjcf")
 _DEGREES = (3, 4)
 _ROUNDING = 1e-14
-"""Of sums over triangles: elements of a tensor and coefficients below it are zero by symmetry."""
+"""Of sums over triangles: places, elements of a tensor and coefficients below it are zero by symmetry."""
 _DRAWN = 5000
 _GRID = 2**15 - 1
 _VOLUME = 1e-9
@@ -94,7 +94,8 @@ def moments_of(path: Path) -> str:
     tensor[np.abs(tensor) < _ROUNDING * tensor.max()] = 0
     drawn, among = _drawn(vertices - center - off, faces[:, :: 1 if volume > 0 else -1], radius)
     lines = [f"# moments of {path.name}, {len(triangles)} triangles, for unit density; {among} are drawn"]
-    lines += [f"volume = {abs(volume)!r}", f"center = {(center + off).tolist()}"]
+    place = np.where(np.abs(center + off) < _ROUNDING * radius, 0.0, center + off)
+    lines += [f"volume = {abs(volume)!r}", f"center = {place.tolist()}"]
     lines += [f"tensor = {tensor.tolist()}", "[gravity_field]", f"radius = {radius!r}"]
     for name, part in (("C", "real"), ("S", "imag")):
         sizes = {f'"{n},{m}"': getattr(value, part) for (n, m), value in field.items() if m or name == "C"}

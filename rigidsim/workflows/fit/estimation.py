@@ -38,6 +38,7 @@ _SHORT = 0.1  # sigmas: a step whose gain rounding may hide
 _SMALL = 1e-4  # rad, below which the series of a function of an angle is right to rounding
 _ROUNDS = 25
 _FROM_START = 40  # evaluations from each of several starts
+_FAR = 30.0  # sigmas, of all residuals together, above which a fit is doubted
 _SAME = 1e-6  # relative difference of the sums of squares of starts that end in the same place
 
 
@@ -343,6 +344,12 @@ def search(
                 f"{readings.label}: more than half of its rows were left out as outliers; its sigmas may be "
                 "too small, or the fit ended far from the truth: try more starts"
             )
+    size = float(np.sqrt(ended.linear.cost / len(ended.linear.residuals)))
+    if size > _FAR:
+        notes.append(
+            f"residuals are {size:.3g} sigmas: the fit ended in another minimum, a load is missing, or the "
+            "sigmas are too small; begin near the first row's attitude and rates, or try more starts"
+        )
     return ended, costs, notes
 
 
