@@ -64,7 +64,9 @@ def test_what_a_minor_loop_loses_beside_the_loop_of_a_published_decay(field: flo
 
         done = solve_ivp(along, [-way * field, way * field], [b, 0], rtol=1e-11, atol=1e-15).y
         b, lost = done[0, -1], done[1, -1] + (lost if n == 15 else 0)
-    jumping = quad(lambda x: np.arctan(k * (x + 12)) - np.arctan(k * (x - 12)), -field, field)[0] * 0.05 / np.pi
+    jumping = (
+        quad(lambda x: np.arctan(k * (x + 12)) - np.arctan(k * (x - 12)), -field, field)[0] * 0.05 / np.pi
+    )
     plain = f'kind = "magnetic_dipole"\nmoment = [0, 0, 0]\nfield = [{field * MU_0}, 0, 0]'
     jumps = plain.replace("[0, 0, 0]", f'["{LOOP}", 0, 0]')
     for loads, known in (([plain, rod()], lost), ([jumps], jumping)):
