@@ -23,6 +23,7 @@ from rigidsim.errors import RigidsimError, ensure
 from rigidsim.formats import gubas
 from rigidsim.formats.messages import MESSAGE_COLUMNS, message_columns
 from rigidsim.scene.epochs import DIGITS, Epoch, parse_epoch
+from rigidsim.scene.exact import is_unit
 from rigidsim.scene.rotations import conjugated, multiplied, turned
 from rigidsim.scene.space_axes import ECLIPTIC, SpaceAxes, from_equator
 from rigidsim.scene.text_tables import (
@@ -33,7 +34,6 @@ from rigidsim.scene.text_tables import (
     name_and_unit,
     open_table,
 )
-from rigidsim.scene.units import is_unit
 from rigidsim.scene.validation_messages import nearest
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, dot, hansen, norm
 from rigidsim.scene.bodies.presets import KNOWN, KnownBody, known_body
 from rigidsim.scene.cautions import Caution, WarningCode
-from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.exact import ExactNumber, time_unit
 from rigidsim.scene.expressions.tree import Constant, Expression, Name, Operation, operations
 from rigidsim.scene.orbits import MEAN_MOTION_KEYS, Elements, KeplerOrbit
 from rigidsim.scene.paths import numbers
@@ -27,7 +27,6 @@ from rigidsim.scene.readable import ASTRONOMICAL_UNIT, length_text, span_text
 from rigidsim.scene.registry import LoadFields
 from rigidsim.scene.scene import Event, Scene
 from rigidsim.scene.schema import Config
-from rigidsim.scene.units import time_unit
 
 _CUBIC_KILOMETRE = 1e9  # m^3
 _AS_PUBLISHED = 1e-3  # relative difference up to which a number is a published one in other units

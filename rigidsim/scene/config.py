@@ -594,37 +594,27 @@ def load(path: str | Path, *, overrides: Overrides = ()) -> Experiment:
 
 
 def _table_sections(config: Config, folder: Path) -> str:
-    """TOML text, to be appended to the config, of tables that loads, sample times and a gravity field name
-    and the config doesn't contain, so that the experiment depends on no other file.
+    """TOML text, to be appended to the config, of files that it names and doesn't contain, so that the
+    experiment depends on no other file.
     """
-    named: list[tuple[str, str, Callable[[TextIO], str]]] = []
-    if isinstance(config.time.times, str):
-        named.append(("[time] times", config.time.times, _times_of))
-    if config.initial.apm is not None:
-        named.append(("[initial] apm", config.initial.apm, _whole))
-    for number, one in enumerate(config.loads, 1):
-        orbit = getattr(one, "elements", None)
-        if orbit is not None and orbit.table is not None:
-            named.append((f"[[loads]] number {number} {orbit.key}.table", orbit.table, _whole))
-    others = ((f"[[rigid_bodies]] number {n}", table) for n, table in enumerate(config.rigid_bodies, 1))
-    for where, body in (("[body]", config.body), *others):
-        parts = ((f"parts[{number}].", part) for number, part in enumerate(body.parts or []))
-        for place, solid in (("", body), *parts):
-            if solid.file is not None:
-                named.append((f"{where} {place}file", solid.file, _mesh if is_mesh(solid.file) else _whole))
-        field = body.gravity_field
-        if field is not None and field.file is not None:
-            degree = asked_degree(field, config.loads, config.sweep)
-            named.append((f"{where} gravity_field file", field.file, partial(cut, degree=degree)))
     found: dict[str, str] = {}
-    for where, name, read in named:
-        if name not in found and name not in config.tables:
-            path, begin = folder / name, f"\n[tables.{inline(name)}]\n"
-            if read is _whole and path.is_file() and (status := path.stat()).st_size > _LARGEST_TABLE:
-                digest, _ = _long_text(path.absolute(), status.st_size, status.st_mtime_ns)
-                found[name] = f'{begin}sha256 = "{digest}"\n'
-                continue
-            found[name] = f"{begin}text = '''\n{_text(where, name, path, read).rstrip()}\n'''\n"
+    for at, name in leaves(config):
+        kind = at.taken(type(config), config).beside if isinstance(name, str) else ""
+        if not kind or name in found or name in config.tables:
+            continue
+        path, begin, read = folder / name, f"\n[tables.{inline(name)}]\n", _whole
+        if kind == "times":
+            read = _times_of
+        elif kind == "field":
+            degree = asked_degree(at.parent.get(config), config.loads, config.sweep)
+            read = partial(cut, degree=degree)
+        elif kind == "solid" and is_mesh(name):
+            read = _mesh
+        elif path.is_file() and (status := path.stat()).st_size > _LARGEST_TABLE:
+            digest, _ = _long_text(path.absolute(), status.st_size, status.st_mtime_ns)
+            found[name] = f'{begin}sha256 = "{digest}"\n'
+            continue
+        found[name] = f"{begin}text = '''\n{_text(at.where, name, path, read).rstrip()}\n'''\n"
     return "".join(found.values())
 
 

@@ -28,9 +28,16 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from rigidsim.errors import ensure
 from rigidsim.scene.epochs import Epoch, parse_epoch
-from rigidsim.scene.exact import ExactNumber, for_doubles, parse_number
+from rigidsim.scene.exact import (
+    ExactNumber,
+    UnitError,
+    for_doubles,
+    parse_number,
+    powers,
+    time_unit,
+    unit_text,
+)
 from rigidsim.scene.two_line_elements import TwoLineElements, parse_elements
-from rigidsim.scene.units import UnitError, powers, time_unit, unit_text
 from rigidsim.scene.validation_messages import meant, shown
 
 _NUMBER_TEXT = r"^\s*[-+]?(\d|\.\d|pi)"
@@ -233,12 +240,19 @@ def within(least: str, most: str) -> Range:
     return Range(lambda x: Fraction(least) <= x <= Fraction(most), f"{least} to {most}", limits)
 
 
-def _not_zero(value: list[ExactNumber]) -> list[ExactNumber]:
-    ensure(any(x.sign for x in value), refuse("given zero; a direction is needed, of any length but zero"))
-    return value
+def checked(holds: Callable[[Any], Any], text: str) -> AfterValidator:
+    """A validator that refuses a value for which something doesn't hold; "{}" in the text is the value."""
+
+    def validate(value: Any) -> Any:
+        ensure(holds(value), refuse(text.format(shown(value))))
+        return value
+
+    return AfterValidator(validate)
 
 
-NotZero = AfterValidator(_not_zero)
+NotZero = checked(
+    lambda value: any(x.sign for x in value), "given zero; a direction is needed, of any length but zero"
+)
 """Annotation of a vector with any norm but zero."""
 
 
@@ -352,6 +366,18 @@ class OneOf:
         return {"type": "string", "enum": self.words}
 
 
+@dataclass(frozen=True)
+class Beside:
+    """Annotation of the name of a file next to the config, whose text is copied into it; ``kind`` says what
+    is kept of it: all ("text"), a column of "times", moments of a mesh ("solid"), or some degrees ("field").
+    """
+
+    kind: str = "text"
+
+
+FileName = Annotated[StrictStr, Beside()]
+
+
 @dataclass(frozen=True, eq=False)
 class OrWord:
     """Annotation of a value of a type that may be one of some words instead; ``allowed`` says what it may."""
@@ -365,9 +391,10 @@ class OrWord:
             return value
         try:
             return inner(value)
-        except ValidationError:
-            allowed = f"{', '.join(self.words)}, or {self.allowed}"
-            raise refuse(f"given {shown(value)}; allowed: {allowed}") from None
+        except ValidationError as error:
+            said = error.errors()[0]
+            given = said["msg"] if said["type"] == "rigidsim" else f"given {shown(value)}"
+            raise refuse(f"{given}; allowed: {', '.join(self.words)}, or {self.allowed}") from None
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         return core_schema.no_info_wrap_validator_function(self._read, handler.generate_schema(self.kind))
@@ -378,13 +405,7 @@ class OrWord:
 
 def named(pattern: str, allowed: str) -> AfterValidator:
     """A validator of names of a pattern; its error says what is ``allowed``."""
-
-    def validate(value: str) -> str:
-        if not re.fullmatch(pattern, value):
-            raise refuse(f"given {shown(value)}; allowed: {allowed}")
-        return value
-
-    return AfterValidator(validate)
+    return checked(re.compile(pattern).fullmatch, f"given {{}}; allowed: {allowed}")
 
 
 VariableName = Annotated[
@@ -405,13 +426,10 @@ BodyName = Annotated[
 """A body of a kernel, by its name or NAIF's number, with or without quotes."""
 
 
-def _each_once(value: list[str]) -> list[str]:
-    if len(set(value)) < len(value):
-        raise refuse("something is named twice; name each once")
-    return value
-
-
-EachOnce = Annotated[list[T], AfterValidator(_each_once)]
+EachOnce = Annotated[
+    list[T],
+    checked(lambda value: len(set(value)) == len(value), "something is named twice; name each once"),
+]
 """An array of different names."""
 
 

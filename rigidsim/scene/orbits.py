@@ -24,6 +24,7 @@ from rigidsim.scene.exact import ZERO, ExactNumber, parse_number
 from rigidsim.scene.fields import (
     NAME_OR_VECTOR,
     Angle,
+    FileName,
     Positive,
     Rate,
     Rule,
@@ -75,7 +76,7 @@ class Elements(Ellipse):
         excludes("plane_of", "periapsis", "mean_anomaly", *MEAN_MOTION_KEYS),
     )
 
-    table: StrictStr | None = Field(None, examples=["mars_elements.csv"])
+    table: FileName | None = Field(None, examples=["mars_elements.csv"])
     """name of a file next to the config, with elements over time"""
     format: Literal["hnbody", "orbitn", "vplanet", "la2010"] | None = None
     """program whose columns the table has; without it the first line names the columns"""

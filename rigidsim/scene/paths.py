@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.fields import Exactly, InUnit, OneOf, OrWord, Range
+from rigidsim.scene.fields import Beside, Exactly, InUnit, OneOf, OrWord, Range
 from rigidsim.scene.validation_messages import nearest, shown
 
 ARRAYS_OF_TABLES = ("loads", "bodies", "rigid_bodies", "rotors", "states", "events", "fit.data")
@@ -27,13 +27,14 @@ _PART = re.compile(r"""\s*(?:"([^"\n]+)"|'([^'\n]+)'|([^\[\].\"']+))((?:\[\d{1,9
 @dataclass(frozen=True)
 class Taken:
     """What a key takes: the SI unit of its numbers ("1" for none), their count (0 for a plain one), the
-    ranges that each is in, and words.
+    ranges that each is in, words, and what is kept of a file of that name (see ``Beside``).
     """
 
     unit: str
     length: int
     ranges: list[Range]
     words: list[str]
+    beside: str
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,8 @@ class Path:
         words = [word for kind, _ in kinds for word in _words(kind)]
         named = (x for _, about in kinds for x in about if isinstance(x, OneOf | OrWord))
         words += [word for x in named for word in x.words]
-        return Taken(unit or _unit(kinds), next(iter(counts), 0), ranges, words)
+        files = (x.kind for _, about in kinds for x in about if isinstance(x, Beside))
+        return Taken(unit or _unit(kinds), next(iter(counts), 0), ranges, words, next(files, ""))
 
     def keys(self, model: type[BaseModel], tables: Mapping[str, Any]) -> list[str]:
         """The keys of the table there; none where there is no table."""

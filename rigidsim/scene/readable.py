@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.scene.epochs import J2000, Epoch, parse_epoch
-from rigidsim.scene.units import time_unit
+from rigidsim.scene.exact import time_unit
 
 DAY = 86400.0
 YEAR = 365.25 * DAY

@@ -17,6 +17,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.exact import ZERO, rounded
 from rigidsim.scene.fields import (
     NAME_OR_VECTOR,
+    Beside,
     ConfigTable,
     Instant,
     Positive,
@@ -49,7 +50,8 @@ class Time(ConfigTable):
     """interval between samples, instead of samples; above zero, backwards too"""
     times: (
         Annotated[
-            Annotated[StrictStr, Tag(NAME_OR_VECTOR[0])] | Annotated[list[Second], Tag(NAME_OR_VECTOR[1])],
+            Annotated[StrictStr, Beside("times"), Tag(NAME_OR_VECTOR[0])]
+            | Annotated[list[Second], Tag(NAME_OR_VECTOR[1])],
             Discriminator(lambda given: NAME_OR_VECTOR[0 if isinstance(given, str) else 1]),
         ]
         | None

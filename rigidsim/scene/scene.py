@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rigidsim.errors import ConfigError, Problem, ensure
-from rigidsim.scene import starts, units
+from rigidsim.scene import starts
 from rigidsim.scene.arithmetic import Matrix, Vector, context_for, cross, diagonal, dot, eigen, vector
 from rigidsim.scene.bodies.body import (
     Body,
@@ -25,7 +25,7 @@ from rigidsim.scene.bodies.body import (
 )
 from rigidsim.scene.bodies.gravity_field import asked_degree, gravity_field_of
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.exact import ExactNumber, UnitError, conversion
 from rigidsim.scene.expressions.names import EULER_NAMES, PROVIDERS, Names, names_of
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import (
@@ -44,7 +44,6 @@ from rigidsim.scene.registry import LOADS, BroughtState, SceneLoad, Setting
 from rigidsim.scene.sample_times import SampleTimes, sample_times
 from rigidsim.scene.schema import Config, EventTable
 from rigidsim.scene.swept import plain
-from rigidsim.scene.units import UnitError
 
 if TYPE_CHECKING:
     from rigidsim.scene.kernels.spice import Orientation
@@ -541,7 +540,7 @@ def resolve_states(setting: Setting) -> list[OwnState]:
         here, start = setting.at("states", number), table.initial
         if start.unit and table.unit is not None:
             try:
-                units.conversion(start.unit, table.unit)
+                conversion(start.unit, table.unit)
             except UnitError as error:
                 raise here.fault("initial", f"given a value in {start.unit}; {error}") from None
         rate = None if table.unit is None else "s^-1" if table.unit == "1" else f"{table.unit}/s"

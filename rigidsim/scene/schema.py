@@ -21,7 +21,6 @@ from itertools import islice, pairwise
 from typing import Annotated, Any, Literal, Self, Union, get_args
 
 from pydantic import (
-    AfterValidator,
     BaseModel,
     Field,
     StrictBool,
@@ -37,11 +36,10 @@ from pydantic import (
 from pydantic.json_schema import GenerateJsonSchema
 
 from rigidsim.errors import ConfigError, Problem, RigidsimError
-from rigidsim.scene import units
 from rigidsim.scene.bodies.body import Body, Matter
 from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.scene.choices import AUTO, DEFAULT_METHOD, FORMULATIONS, METHODS, ORBIT_AVERAGED, REDUCED
-from rigidsim.scene.exact import ZERO, ExactNumber
+from rigidsim.scene.exact import ZERO, ExactNumber, UnitError, powers, to_si, unit_text
 from rigidsim.scene.expressions.names import BODY_NAMES
 from rigidsim.scene.expressions.tree import RESERVED
 from rigidsim.scene.fields import (
@@ -54,6 +52,7 @@ from rigidsim.scene.fields import (
     EachOnce,
     ElementLines,
     EulerSequence,
+    FileName,
     Formula,
     Four,
     Irradiance,
@@ -73,6 +72,7 @@ from rigidsim.scene.fields import (
     Speed,
     Triple,
     VariableName,
+    checked,
     excludes,
     named,
     number_schema,
@@ -88,7 +88,6 @@ from rigidsim.scene.paths import ARRAYS_OF_TABLES, Path
 from rigidsim.scene.point_masses import PointMassBody
 from rigidsim.scene.registry import LOADS, MESSAGES, OBSERVABLES, BroughtState, LoadFields
 from rigidsim.scene.sample_times import Time
-from rigidsim.scene.units import UnitError
 from rigidsim.scene.validation_messages import meant, shown
 
 _FOLDER_NAME = "^[A-Za-z0-9._-]{1,100}$"
@@ -149,7 +148,7 @@ class Initial(Motion):
     """start in an equilibrium, which is found: relative (at rest in the frame of a circular orbit; the stable
     one, or the one nearest to an attitude that is given), or a Cassini state of an orbit whose node moves
     """
-    apm: StrictStr | None = Field(None, examples=["satellite.apm"])
+    apm: FileName | None = Field(None, examples=["satellite.apm"])
     """name of a file next to the config, a CCSDS attitude parameter message: its attitude, and its rates if
     it has any; without [time] epoch its date is the start
     """
@@ -387,9 +386,10 @@ _DIGITS = OrWord(
     Annotated[StrictInt, Field(ge=1, le=LARGEST_DIGITS)],
     f"a number of decimal digits from 1 to {LARGEST_DIGITS}",
 )
+_UP_TO_1 = Range(lambda x: 0 < x <= 1, "above 0, at most 1", {"exclusiveMinimum": 0, "maximum": 1})
 _TOLERANCE = OrWord(
     ("auto",),
-    Annotated[Dimensionless, Range(lambda x: 0 < x <= 1, "", {"exclusiveMinimum": 0, "maximum": 1})],
+    Annotated[Dimensionless, _UP_TO_1],
     "a number above 0 and at most 1",
 )
 
@@ -536,16 +536,14 @@ MOST_STARTS = 10_000
 _ONE_OR_MORE = Range(lambda x: x >= 1, "1 or more")
 
 
-def _sigma(value: Any) -> Any:
-    if isinstance(value, bool | dict) or value is None:
-        raise refuse(
-            f"given {shown(value)}; a standard deviation is allowed, of a vector one for each component, of "
-            "data the name of a column"
-        )
-    return value
-
-
-Sigma = Annotated[Any, AfterValidator(_sigma)]
+Sigma = Annotated[
+    Any,
+    checked(
+        lambda value: not (isinstance(value, bool | dict) or value is None),
+        "given {}; a standard deviation is allowed, of a vector one for each component, of data the name of "
+        "a column",
+    ),
+]
 
 
 class KnownWithin(ConfigTable):
@@ -702,7 +700,13 @@ _NUMBER = ("", "1")
 class OwnStateTable(ConfigTable):
     """``[[states]]``: a user-defined state, integrated with the motion and readable in every expression."""
 
-    name: VariableName = Field(examples=["integral"])
+    name: Annotated[
+        VariableName,
+        checked(
+            lambda name: name not in BODY_NAMES and name not in RESERVED,
+            "given {}, which expressions use already; rename it",
+        ),
+    ] = Field(examples=["integral"])
     """name in expressions, and of the variable in the dataset"""
     initial: AnyQuantity = Field(ZERO, json_schema_extra={"x-unit-key": "unit"})
     """value at the start, SI or with its unit"""
@@ -712,13 +716,6 @@ class OwnStateTable(ConfigTable):
     derivative: Formula = Field(examples=["wz", "(2*k*qz - torque)/(2 s)"])
     """rate of change in SI: an expression of t, the state, [[states]] and [parameters]"""
 
-    @field_validator("name")
-    @classmethod
-    def _free(cls, value: str) -> str:
-        if value in BODY_NAMES or value in RESERVED:
-            raise refuse(f'given "{value}", which expressions use already; rename it')
-        return value
-
     @field_validator("unit")
     @classmethod
     def _in_si(cls, value: str | None) -> str | None:
@@ -727,12 +724,12 @@ class OwnStateTable(ConfigTable):
         if value in _NUMBER:
             return "1"
         try:
-            factor, pi_power = units.to_si(value)
+            factor, pi_power = to_si(value)
         except UnitError as error:
             raise refuse(f"given {shown(value)}: {error}") from None
         if factor != 1 or pi_power:
-            found = units.powers(value)
-            instead = units.unit_text(found) if found else "rad"
+            found = powers(value)
+            instead = unit_text(found) if found else "rad"
             raise refuse(f'given "{value}"; states are in SI: "{instead}" is allowed')
         return value
 

@@ -18,8 +18,7 @@ from functools import cached_property
 from typing import Any
 
 from rigidsim.scene.epochs import A_DATE, Epoch, parse_epoch
-from rigidsim.scene.exact import parse_number
-from rigidsim.scene.units import is_unit
+from rigidsim.scene.exact import is_unit, parse_number
 
 TIMES = (
     "t", "time", "times", "epoch", "seconds", "timestamp", "timestamps", "date", "datetime", "utc", "stamp",

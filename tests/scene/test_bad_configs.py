@@ -127,7 +127,7 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
     ],
     "integrator": [
         ('method = "rk4"', "method", 'given "rk4"', "allowed: taylor"),
-        ("tolerance = 0", "tolerance", "given 0; allowed: auto, or a number above 0 and at most 1"),
+        ("tolerance = 0", "tolerance", "allowed: auto, or a number above 0 and at most 1"),
         ('formulation = "canonical"', "formulation", "singularity of the sequence zxz"),
     ],
     "output": [

@@ -54,6 +54,7 @@ from rigidsim.scene.exact import ZERO, ExactNumber, exact_decimal, parse_number
 from rigidsim.scene.fields import (
     NAME_OR_VECTOR,
     Angle,
+    Beside,
     BodyName,
     ConfigTable,
     Dimensionless,
@@ -273,7 +274,7 @@ class _Shaped(ConfigTable):
     rules: ClassVar[tuple[Rule, ...]] = (only_with("file", "link", "density", "unit"),)
     shape: Annotated[str, OneOf(SHAPES)] | None = None
     """a homogeneous solid; needs mass and dimensions"""
-    file: StrictStr | None = Field(None, examples=["boom.stl", "arm.urdf"])
+    file: Annotated[StrictStr, Beside("solid")] | None = Field(None, examples=["boom.stl", "arm.urdf"])
     """a file next to the config: a mesh of uniform density (.stl, .obj, .ply, .off; with mass or density), or
     a robot's links with their inertia (.urdf, .xml of MuJoCo)
     """

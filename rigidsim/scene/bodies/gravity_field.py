@@ -22,13 +22,22 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, StrictInt, StrictStr, field_validator, model_validator
 
 from rigidsim.errors import ConfigError, Problem, ensure
 from rigidsim.scene.exact import parse_number, rounded
-from rigidsim.scene.fields import ConfigTable, Dimensionless, Metre, Positive, excludes, one_of, refuse
+from rigidsim.scene.fields import (
+    Beside,
+    ConfigTable,
+    Dimensionless,
+    Metre,
+    Positive,
+    excludes,
+    one_of,
+    refuse,
+)
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.swept import plain
 from rigidsim.scene.text_tables import as_number, text_of
@@ -106,7 +115,7 @@ class GravityFieldTable(HarmonicsTable):
     """unnormalized coefficients of cos m lon by "degree,order", from degree 3 on: C_30 is minus J3"""
     S: dict[StrictStr, Dimensionless] | None = Field(None, examples=[{"3,1": 5.9e-6}])
     """likewise with sin m lon"""
-    file: StrictStr | None = Field(None, examples=["FIELD.gfc"])
+    file: Annotated[StrictStr, Beside("field")] | None = Field(None, examples=["FIELD.gfc"])
     """instead: a file next to the config, ICGEM (.gfc) or SHADR (.tab), whose text is copied here"""
     degree: StrictInt | None = Field(None, ge=LEAST, le=MOST, examples=[8])
     """highest degree that is read from the file; by default the highest that a load asks for"""

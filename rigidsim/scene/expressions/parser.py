@@ -27,9 +27,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import NoReturn
 
-from rigidsim.scene import units
 from rigidsim.scene.arithmetic import context_for
-from rigidsim.scene.exact import ExactNumber, parse_number
+from rigidsim.scene.exact import ExactNumber, Powers, is_unit, parse_number, powers, unit_text
 from rigidsim.scene.expressions.names import BODY_NAMES, Readable
 from rigidsim.scene.expressions.tree import (
     FUNCTIONS,
@@ -193,7 +192,7 @@ class _Parser:
         run = re.match(r"[\w.]*", rest)
         if self.kind == "number" and run and run.end() > match.end():
             unit, hint = run[0][match.end() :], "; a product has its *, as in 2*t"
-            if unit not in self.known and units.is_unit(unit):
+            if unit not in self.known and is_unit(unit):
                 hint = f'; a space separates a unit, as in "{match[0]} {unit}"'
             self.fail(f'"{run[0]}" is no number, such as 2, 0.5 or 1e-3{hint}')
         return passed
@@ -238,8 +237,8 @@ class _Parser:
     def about_units(self, name: str) -> str:
         """Why a name that could be a unit isn't one here."""
         if name in self.known:
-            return f' ("{name}" is no unit here, but a name of this scene)' if units.is_unit(name) else ""
-        if units.is_unit(name):
+            return f' ("{name}" is no unit here, but a name of this scene)' if is_unit(name) else ""
+        if is_unit(name):
             return f"; a unit follows a number, as in 2 {name}"
         return f'; no unit is called "{name}"'
 
@@ -294,7 +293,7 @@ class _Parser:
         if name == "e":
             return self.node("e", start)
         near = nearest(name, self.known) or nearest(name.lower(), self.known)
-        near = self.about_units(name) if units.is_unit(name) else near
+        near = self.about_units(name) if is_unit(name) else near
         allowed = "; ".join([", ".join(self.known), *getattr(self.names, "elsewhere", ())])
         self.fail(f'unknown name "{name}"{near}; allowed: {allowed}', start)
 
@@ -357,7 +356,7 @@ class Measure:
     possible), and whether a unit was written in the value.
     """
 
-    powers: units.Powers | None
+    powers: Powers | None
     written: bool = False
 
     def times(self, other: Measure, power: Fraction | int = 1) -> Measure:
@@ -381,7 +380,7 @@ class Measure:
     def __str__(self) -> str:
         if self.powers is None:
             return "a value of any dimension"
-        return f'a value in "{units.unit_text(self.powers)}"' if self.powers else "a number or an angle"
+        return f'a value in "{unit_text(self.powers)}"' if self.powers else "a number or an angle"
 
 
 NUMBER, ANY = Measure(()), Measure(None)
@@ -390,13 +389,13 @@ NUMBER, ANY = Measure(()), Measure(None)
 def _measure_of_constant(node: Constant) -> Measure:
     """Dimension of a number: the dimension of its unit, if it has one."""
     unit = node.value.unit
-    return Measure(units.powers(unit), written=True) if unit else ANY
+    return Measure(powers(unit), written=True) if unit else ANY
 
 
 def _measure_of_name(node: Name) -> Measure:
     """Dimension of what a name stands for."""
     unit = node.of.unit
-    return ANY if unit is None else Measure(units.powers(unit)) if unit else NUMBER
+    return ANY if unit is None else Measure(powers(unit)) if unit else NUMBER
 
 
 def _measure_of_operation(node: Operation, operands: Sequence[Measure], last: Expression | None) -> Measure:
@@ -429,7 +428,7 @@ def _measure_of_operation(node: Operation, operands: Sequence[Measure], last: Ex
     if common.powers and common.written and name not in ("sign", "step", "pulse", "atan2"):
         raise node.error(
             f'"{name}" takes a number or an angle, given {common}; divide by '
-            f'"(1 {units.unit_text(common.powers)})" if that is meant'
+            f'"(1 {unit_text(common.powers)})" if that is meant'
         )
     return Measure((), any(operand.written for operand in operands))
 
@@ -441,7 +440,7 @@ def _check_unit(found: Measure, needed: str, *, read_too: bool = False) -> None:
         read_too: also if its dimension is only the dimension of what it reads.
     """
     known = found.written or (read_too and bool(found.powers))
-    if known and found.powers is not None and found.powers != units.powers(needed):
+    if known and found.powers is not None and found.powers != powers(needed):
         raise ExpressionError(f'the expression is {found}, where "{needed}" is needed')
 
 
@@ -470,7 +469,7 @@ def _end_of_unit(text: str, position: int, names: Collection[str], parameters: C
     while (match := _WORD_OF_UNIT.match(text, end)) is not None:
         name, join = match["name"], match["join"]
         called = text[match.end() :].lstrip(" \t").startswith("(") and match["power"] is None
-        if called or name in names or (join and end == position) or not units.is_unit(name):
+        if called or name in names or (join and end == position) or not is_unit(name):
             break
         if join and name in parameters:
             raise ValueError(

@@ -36,7 +36,7 @@ from rigidsim.model.names import written
 from rigidsim.model.observables.observable import Observable
 from rigidsim.scene.choices import DEFAULT_METHOD
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.exact import parse_number
+from rigidsim.scene.exact import parse_number, powers, unit_text
 from rigidsim.scene.expressions.names import names_of
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import ExpressionError, names_used, states_read
@@ -46,7 +46,6 @@ from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.scene.schema import Config, FitDataTable, KnownWithin
 from rigidsim.scene.space_axes import SpaceAxes
 from rigidsim.scene.starts import given_attitude, spin_rate
-from rigidsim.scene.units import powers, unit_text
 from rigidsim.scene.validation_messages import nearest, shown
 from rigidsim.scene.varied_keys import ATTITUDE, VariedKey, varied_keys
 from rigidsim.solve.problem import prepare
