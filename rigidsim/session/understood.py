@@ -26,6 +26,7 @@ from rigidsim.scene.readable import TimeWords, length_text, number_text
 from rigidsim.scene.registry import LOADS, one_of
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
+from rigidsim.scene.starts import given_attitude
 from rigidsim.scene.swept import plain
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.store.summary import Span, Start, Three, UnderstoodBody
@@ -50,13 +51,22 @@ def body_of(scene: Scene) -> UnderstoodBody:
 def start_of(scene: Scene) -> Start:
     """The state that the motion starts from; Euler angles in the config's sequence."""
     context, sequence = scene.context, scene.config.integrator.euler_sequence
-    angles = scene.euler_angles
-    if angles is None:
-        angles = attitude.euler_from_matrix(context, attitude.rotation_matrix(scene.quaternion), sequence)
+
+    def degrees(quaternion: Vector, angles: Vector | None) -> Three:
+        if angles is None:
+            angles = attitude.euler_from_matrix(context, attitude.rotation_matrix(quaternion), sequence)
+        return _three([180 * angle / context.pi for angle in angles])
+
+    frame, given = scene.config.initial.relative_to, None
+    if frame is not None:
+        begun = given_attitude(scene)
+        given = degrees(begun.quaternion, begun.euler_angles)
     w, x, y, z = (float(component) for component in scene.quaternion)
     return Start(
         euler_sequence=sequence,
-        euler_angles_deg=_three([180 * angle / context.pi for angle in angles]),
+        euler_angles_deg=degrees(scene.quaternion, scene.euler_angles),
+        relative_to=frame,
+        relative_euler_angles_deg=given,
         quaternion=(w, x, y, z),
         angular_velocity=_three(scene.angular_velocity),
         position=None if scene.position is None else _three(scene.position),

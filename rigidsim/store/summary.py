@@ -327,6 +327,7 @@ class Start(SummaryPart):
         quaternion: w x y z, body to space.
         angular_velocity: body axes, rad/s.
         position, velocity: of the centre of mass, space axes, m and m/s; None unless it moves freely.
+        relative_to: local frame that it was given against, if any, with the angles there.
     """
 
     euler_sequence: Text
@@ -336,6 +337,8 @@ class Start(SummaryPart):
     position: Three | None = None
     velocity: Three | None = None
     equilibrium: FoundStart | None = None
+    relative_to: Text | None = None
+    relative_euler_angles_deg: Three | None = None
 
 
 class Span(SummaryPart):

@@ -150,7 +150,9 @@ def test_attitude_and_rates_count_from_the_frame(seed: int) -> None:
         output='record = ["quaternion", "angular_velocity", "roll_pitch_yaw"]',
     )  # fmt: skip
     with unoptimised_code():
-        dataset = loaded(run_text(text))
+        made = run_text(text)
+    dataset, start = loaded(made), made.summary["start"]
+    assert start["relative_euler_angles_deg"] == pytest.approx(np.degrees(angles), abs=1e-12)
     frame = np.array([[float(x) for x in axis] for axis in axes(word, *at(mp.zero))]).T
     slopes = [mp.diff(lambda t, n=n: axes(word, *at(t))[n // 3][n % 3], 0) for n in range(9)]
     change = np.array(list(map(float, slopes))).reshape(3, 3).T

@@ -60,6 +60,9 @@ def start_text(start: Start) -> str:
     attitude = f"attitude {start.euler_sequence} {angles} deg"
     if not any(start.euler_angles_deg):
         attitude = "attitude: body axes along space axes"
+    if start.relative_euler_angles_deg is not None:
+        given = f"{start.euler_sequence} {_numbers(start.relative_euler_angles_deg)} deg"
+        attitude += f" in space, {given} against {start.relative_to}"
     rate = math.hypot(*start.angular_velocity)
     turning = f"angular velocity {_numbers(start.angular_velocity)} rad/s about x, y, z"
     if rate:
