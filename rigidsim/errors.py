@@ -94,9 +94,9 @@ class ConfigError(RigidsimError):
     def __init__(self, problems: Sequence[Problem] | Problem, source: str | None = None) -> None:
         self.problems = [problems] if isinstance(problems, Problem) else list(problems)
         self.source = source
-        super().__init__(self._text())
+        super().__init__(problems, source)
 
-    def _text(self) -> str:
+    def __str__(self) -> str:  # formed when it is read: most errors are only made for ``ensure``
         lines = "\n".join(f"  {problem}" for problem in self.problems[:_MOST_SHOWN])
         if len(self.problems) > _MOST_SHOWN:
             lines += f"\n  and {len(self.problems) - _MOST_SHOWN} more"

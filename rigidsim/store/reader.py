@@ -13,7 +13,7 @@ from typing import Any
 import h5py
 import numpy as np
 import xarray
-from xarray.backends import AbstractDataStore, BackendArray
+from xarray.backends import AbstractDataStore, BackendArray, InMemoryDataStore
 from xarray.core import indexing
 
 from rigidsim.errors import RunFolderError
@@ -96,7 +96,7 @@ def in_memory(
     }
     for name, dims, values, recorded in parts:
         content[name] = xarray.Variable(dims, values, _as_read(recorded), {"dtype": values.dtype})
-    return xarray.decode_cf(xarray.Dataset(content, attrs=_as_read(attributes))).load()
+    return xarray.decode_cf(InMemoryDataStore(content, _as_read(attributes))).load()
 
 
 def _as_read(attributes: Mapping[str, Any]) -> dict[str, Any]:
