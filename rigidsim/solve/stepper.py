@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any, Protocol
 
 import numpy as np
@@ -61,9 +62,9 @@ class SamplesWithin:
 
     def passed(self, now: Scalar, dense: Callable[[Scalar], np.ndarray]) -> bool:
         """Take those within a step that ends now; False if it asks to end the call."""
-        count = len(self.states)
-        while count < len(self.times) and self.times[count] <= now:
-            self.states.append(np.array(dense(self.times[count])))  # heyoka reuses its buffer
+        count, times = len(self.states), self.times
+        while count < len(times) and times[count] <= now:
+            self.states.append(np.array(dense(times[count])))  # heyoka reuses its buffer
             count += 1
         self.ended = now >= self.times[-1]
         return not self.ended
@@ -279,7 +280,7 @@ def bound_of_sparse_series(coefficients: np.ndarray) -> float:
 def may_be_sparse(coefficients: np.ndarray) -> np.ndarray:
     """Which of many steps, by their coefficients (n, states, order + 1), may have such a bound."""
     with np.errstate(all="ignore"):
-        sizes = np.abs(coefficients.astype(np.float64)).max(axis=1)
+        sizes = reduce(np.maximum, np.abs(coefficients.astype(np.float64, copy=False)).swapaxes(0, 1))
         order = sizes.shape[1] - 1
         terms = np.arange(order // 2 + 1, order + 1)
         entire = np.array([math.lgamma(term + 1) / term for term in terms])

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -47,15 +48,19 @@ class SurfaceValues:
     spans: np.ndarray  # of time, to which the rounding of the arguments is relative
     epsilon: float
 
+    @cached_property
+    def _slopes(self) -> np.ndarray:
+        return np.abs(self.gradients)
+
     def _sizes(self, states: np.ndarray) -> np.ndarray:
-        return np.einsum("jin,in->jn", np.abs(self.gradients), np.abs(states))
+        return np.einsum("jin,in->jn", self._slopes, np.abs(states))
 
     def noises(self, *states: np.ndarray) -> np.ndarray:
         """Sizes (surfaces, n) below which arguments are zero but for rounding of states (n, states)."""
         largest = np.max([np.abs(np.atleast_2d(given).astype(np.float64)) for given in states], axis=0)
         return _ROUNDINGS * self.epsilon * (np.abs(self.by_time) * self.spans + self._sizes(largest.T))
 
-    @property
+    @cached_property
     def rate_noises(self) -> np.ndarray:
         """The same of rates."""
         return _RATE_ROUNDINGS * self.epsilon * (np.abs(self.by_time) + self._sizes(self.field))
@@ -189,6 +194,10 @@ class Fields:
         """Surfaces on which the motion stays, or which it touches, whatever the sides."""
         still = np.all(np.abs([*self._rates.values()]) <= self._noise, axis=0)
         return [j for j, stays in zip(self.surfaces, still, strict=True) if stays]
+
+    def crossed(self, side: int) -> bool:
+        """Whether the fields of both sides lead clearly to this side of a single surface."""
+        return all(side * rates[0] > self._noise[0] for rates in self._rates.values())
 
     def choose(self) -> Continuation:
         """The one combination of sides whose field agrees with it."""

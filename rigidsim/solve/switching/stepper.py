@@ -8,9 +8,11 @@ itself: the fields of all sides decide how the motion goes on from its end. Whet
 that step alone, and a plain one by itself has the same bits; so these don't depend on how many steps are
 taken at once.
 
-The engine would find the zero at which a step begins again and again, in place of those that follow. So where
-an argument is zero but for rounding, its event watches the sum with a parameter, a rounding on the side that
-the motion is on. Then no cooldown is needed, and a boundary holds all that later steps depend on.
+The engine would find the zero at which a step begins again and again, in place of those that follow. So an
+event watches for the argument's way out of the side that the motion is on, never for its way in: a clear
+crossing leaves the surface behind. Where the argument stays zero but for rounding, its event watches the sum
+with a parameter, a rounding on that side. Then no cooldown is needed, and a boundary holds all that later
+steps depend on.
 
 Surfaces that depend on time alone are crossed at moments known as written, where steps end
 (``rigidsim.solve.switching.moments``). The turns of angles and the sign of the quaternion, where an
@@ -69,21 +71,20 @@ class _Passed(NamedTuple):
     """A boundary that was passed among many, with what its step may have to be taken back for.
 
     Attributes:
-        pars: parameters beyond it, of which the first are the sides.
         crossed: the surface on which the step ended; -1 for none.
         switches: number and begin of the switches that may accumulate.
         samples: number of samples taken up to here.
+        size: of the step, which may be negative.
         series: Taylor coefficients of the step if it began on a surface, (states, order + 1).
     """
 
     time: tuple[Scalar, Scalar]
     state: np.ndarray
     events: int
-    pars: np.ndarray
     crossed: int
     switches: tuple[int, float]
     samples: int
-    size: float
+    size: Scalar
     series: np.ndarray | None
 
 
@@ -104,20 +105,22 @@ class SwitchingStepper(TaylorStepper):
         self._cut: tuple[int, int] | None = None  # surface on which the engine ended it, and the new side
         self._passed: list[_Passed] | None = None  # boundaries, while many steps are taken
         self._halted = self._fresh = False
-        self._offset: list[int] = []  # parameters that are added to events
         self._ahead = _FIRST_AHEAD
         self._functions_by_chart: dict[int, SurfaceFunctions] = {}
         self._chart = 0
         self._moments = Moments(system, precision)
         self._modes = [1] * len(system.surfaces)
         self._free = np.array([j not in self._moments.timed for j in range(len(self._modes))], dtype=bool)
+        # number from 1 of the surface where the latest step ended, negative after a clear crossing
         self._crossed, self._count, self._since = 0, 0, 0.0
         shortest = min(_SHORTEST, (_ROUNDINGS * float(precision.epsilon)) ** 0.5)
         self._window = _MOST_SWITCHES * shortest  # within which so many switches are an accumulation
         self._count_of_pars = system.parameters  # without what is added to events
         self._piece: np.ndarray | None = None  # parameters of the piece in which the latest step was
-        self._now = np.zeros(0)  # parameters that sides and equations read, all of them
-        self._off, self._minus, self._plus = map(precision.of_double, (0.0, -1.0, 1.0))
+        self._now = np.zeros(0)  # parameters that sides and equations read, all of them, where steps begin
+        self._off, self._signs = precision.of_double(0.0), precision.of_doubles(np.array([-1.0, 1.0]))
+        self._beside = 2.0 ** (-precision.bits - BESIDE)
+        self._usual = [self._beside] * len(self._modes) + [0.0] * len(system.crossings)
         super().__init__(system, precision, tolerance, start, log)
         # in the partner chart, where a run may begin, angles are plain already
         self._turned = Turned.begun(system, *self._plain(self.state, self.time))
@@ -153,8 +156,11 @@ class SwitchingStepper(TaylorStepper):
         if not passed:
             return self.back_to(begun)
         last, (tiny, sides) = passed[-1], begun.memory
-        modes = [1 if side > 0 else -1 for side in last.pars[: len(self._modes)]]
-        memory = tiny, (*modes, *sides[len(modes) : -3], last.crossed + 1, *last.switches)
+        modes = list(sides[: len(self._modes)])
+        for boundary in passed:
+            if boundary.crossed >= 0:
+                modes[boundary.crossed] *= -1
+        memory = tiny, (*modes, *sides[len(modes) : -3], -(last.crossed + 1), *last.switches)
         return self.back_to(Mark(last.time, last.state, last.events, begun.steps + len(passed), memory))
 
     def back_to(self, mark: Mark) -> None:
@@ -192,8 +198,8 @@ class SwitchingStepper(TaylorStepper):
 
     def _compiled(self, system: System) -> TaylorEngine:
         options, equations, along = dict(self.precision.options), system.equations, self._along
-        shifted = [u + hy.par[system.parameters + j] for j, u in enumerate(system.surfaces)]
-        arguments = enumerate(of_order_one(system, shifted, system.surfaces))
+        outwards = [hy.par[j] * u + hy.par[system.parameters + j] for j, u in enumerate(system.surfaces)]
+        arguments = enumerate(of_order_one(system, outwards, system.surfaces))
         ends = [self._event(u, j) for j, u in arguments if self._free[j] and j not in along]
         noted = []
         if along:
@@ -218,15 +224,15 @@ class SwitchingStepper(TaylorStepper):
         )
 
     def _event(
-        self, u: hy.expression, j: int, end: int = 0, way: hy.event_direction = hy.event_direction.any
+        self, u: hy.expression, j: int, end: int = 0, way: hy.event_direction = hy.event_direction.negative
     ) -> hy.t_event:
         """The event that ends steps on a surface, or the motion along it."""
 
-        def called(engine: TaylorEngine, sign: int) -> bool:
-            self._cut = j, end or sign
+        def called(engine: TaylorEngine, _: int) -> bool:
+            self._cut = j, end or -self._modes[j]
             if self._passed is None:
                 return False
-            self._halted = self._halted or not self._crosses(engine, *self._cut)
+            self._halted = self._halted or not self._crosses(engine, j)
             return not self._halted
 
         return hy.t_event(
@@ -298,13 +304,13 @@ class SwitchingStepper(TaylorStepper):
         engine, pars = self._integrator, self._parameters()
         look = self._functions.look(self.state, self.time, pars)
         # the change of the state in a unit of time shows its size
-        noises, moved = look.noises(self.state, look.field.T)[:, 0], [0.0] * len(self._modes)
-        for j, mode in enumerate(self._modes):
+        noises, moved = look.noises(self.state, look.field.T)[:, 0], self._usual[: len(self._modes)]
+        for j in np.flatnonzero(self._free).tolist():
             near = abs(look.u[j, 0]) <= noises[j] or j + 1 == self._crossed
-            if near and self._free[j]:
-                moved[j] = mode * self._functions.beside(self.state, self.time, pars, j)
+            if near and j + 1 != -self._crossed:
+                moved[j] = self._functions.beside(self.state, self.time, pars, j)
         for j in muted:
-            moved[j] = self._modes[j] * _FAR_OFF
+            moved[j] = _FAR_OFF
         if self.has_events:
             moved += [
                 self._event_offset(value, noise)
@@ -313,13 +319,12 @@ class SwitchingStepper(TaylorStepper):
         everything = np.concatenate([pars, self.precision.of_doubles(np.array(moved))])
         engine.pars[:] = everything[: len(engine.pars)]  # those that nothing reads have no meaning
         self._now = pars
-        self._offset = [self.system.parameters + i for i, number in enumerate(moved) if number]
 
     def _event_offset(self, value: float, noise: float) -> float:
         """Offset to add to an event's expression."""
         if self._along and abs(value) <= noise:  # it is zero all along the surface and crosses nothing
             return 2 * noise
-        return 2.0 ** (-self.precision.bits - BESIDE) if self._crossed and value == 0 else 0.0
+        return self._beside if self._crossed and value == 0 else 0.0
 
     # --- many steps -----------------------------------------------------------------------------------------
 
@@ -375,7 +380,7 @@ class SwitchingStepper(TaylorStepper):
         finally:
             passed, self._passed = self._passed, None
         if passed:
-            self.steps, self._crossed = self.steps + len(passed), passed[-1].crossed + 1
+            self.steps, self._crossed = self.steps + len(passed), -(passed[-1].crossed + 1)
         kept, alone = self._holding(begun, passed)
         alone = alone or (kept == len(passed) and (self._halted or outcome == hy.taylor_outcome.err_nf_state))
         self._ahead = min(2 * self._ahead, _MOST_AHEAD) if kept == len(passed) else max(kept, 1)
@@ -384,58 +389,51 @@ class SwitchingStepper(TaylorStepper):
             if samples is not None:
                 samples.back_to(passed[kept - 1].samples if kept else known)
         if kept:
-            sizes = [one.size for one in passed[:kept]]
+            sizes = [abs(float(one.size)) for one in passed[:kept]]
             self.smallest, self.largest, self._dense = min(sizes), max(sizes), engine
             self._judge(begun.time[0], kept)
             self._hold()
         return alone
 
-    def _crosses(self, engine: TaylorEngine, j: int, side: int) -> bool:
+    def _crosses(self, engine: TaylorEngine, j: int) -> bool:
         """Go on beyond a surface on which a step ended among many; False if that has to be looked into."""
-        time, first, pars, now = engine.time, self._count_of_pars, engine.pars, self._now.copy()
-        if side != -self._modes[j] or not self._counts(float(time)):
+        if not self._counts(float(engine.time)):
             return False
-        self._modes[j], self._now = side, now
-        pars[j] = now[j] = self._plus if side > 0 else self._minus
-        beside = self._functions.beside(engine.state, time, now, j)
-        pars[first + j] = self.precision.of_double(side * beside)
-        self._quieten(time)
+        side = self._modes[j] = -self._modes[j]
+        engine.pars[j] = self._signs[int(side > 0)]
+        self._quieten(engine.time)
         return True
 
     def _noting(
         self, passed: list[_Passed], knot: tuple[Scalar, Scalar] | None, samples: SamplesWithin | None
     ) -> StepCallback:
         """What notes each boundary among many; with few look-ups, as a step takes some ten times as long."""
-        engine, first, found, off = self._integrator, self._count_of_pars, self.log.found, self._off
-        state, pars = engine.state, engine.pars  # views that follow the engine
-        clocked = self._functions.clocked and self.system.pieces is None
+        engine, first, found = self._integrator, self._count_of_pars, self.log.found
+        state, pars, series = engine.state, engine.pars, engine.tc  # views that follow the engine
+        clocked = self._functions.clocked and self.system.pieces is None and len(pars) >= first
         taken, upcoming = (0, None) if samples is None else (len(samples.states), samples.upcoming)
+        added, quiet = pars[first:], not self.has_events
+        usual = self.precision.of_doubles(np.array(self._usual[: len(added)]))
 
         def note(engine: TaylorEngine) -> bool:
             nonlocal taken, upcoming
-            time, cut = engine.dtime, self._cut
+            time, cut, going = engine.dtime, self._cut, True
             if knot is not None and (time >= knot or time[0] >= knot[0]):
                 self._halted = True
             if self._halted:
                 return False
-            crossed = -1 if cut is None else cut[0]
-            for place in self._offset:
-                if place != first + crossed:
-                    pars[place] = off
-            self._offset = [] if cut is None else [first + crossed]
+            if not passed:  # what was near where the steps began
+                added[:] = usual
             if clocked:
-                self._now = np.append(self._now[:-1], time[1])
-                if len(pars) >= first:
-                    pars[first - 1] = time[1]
-            going = True
+                pars[first - 1] = time[1]
             if samples is not None and (upcoming is None or time[0] >= upcoming):
                 going = samples(engine)
                 taken, upcoming = len(samples.states), samples.upcoming
-            series, size = np.array(engine.tc) if self._fresh else None, abs(float(engine.last_h))
-            now, switches = self._now, (self._count, self._since)
-            held = time, state.copy(), len(found), now, crossed, switches, taken, size, series
+            crossed, switches = -1 if cut is None else cut[0], (self._count, self._since)
+            kept = series.copy() if self._fresh else None
+            held = time, state.copy(), len(found), crossed, switches, taken, engine.last_h, kept
             passed.append(tuple.__new__(_Passed, held))  # a third of the time of _Passed(...)
-            if cut is None and self.has_events:
+            if cut is None and not quiet:
                 self._quieten(None)
             self._cut, self._fresh = None, cut is not None
             return going
@@ -450,18 +448,24 @@ class SwitchingStepper(TaylorStepper):
         """
         if not passed:
             return 0, False
-        states = np.array([begun.state, *(one.state for one in passed)])
-        before, here, times = states[:-1], states[1:], np.array([one.time[0] for one in passed])
-        pars, crossed = np.array([one.pars for one in passed]), np.array([one.crossed for one in passed])
-        sides = np.where(pars[:, : len(self._modes)] > 0, 1.0, -1.0)
+        both, reached, _, cut, _, _, sizes, kept = zip(*passed, strict=True)
+        states = np.concatenate([begun.state, *reached]).reshape(-1, len(begun.state))
+        before, here, times, crossed = states[:-1], states[1:], np.array([x for x, _ in both]), np.array(cut)
+        rows = np.flatnonzero(crossed >= 0)
+        j, each, flips = crossed[rows], np.arange(len(rows)), np.ones((len(passed), len(self._modes)))
+        flips[rows, j] = -1.0
+        sides = np.array(begun.memory[1][: len(self._modes)]) * np.cumprod(flips, axis=0)
+        pars = np.repeat(self._now[None], len(passed), axis=0)
+        pars[:, : len(self._modes)] = self._signs[(sides > 0).astype(int)]
+        if self._functions.clocked and self.system.pieces is None:
+            pars[:, -1] = [low for _, low in both]
         look = self._functions.looks(here, times, pars)
         size, widths = np.abs(look.u), look.noises(before, here, look.field.T)
         others = self._free[:, None] & (np.arange(sides.shape[1])[:, None] != crossed)
         near, wrong = (others & (size <= widths)).any(axis=0), others & (sides.T * look.u < 0)
         bad = (wrong & (size > look.noises(here))).any(axis=0) if wrong.any() else np.zeros_like(near)
-        rows = np.flatnonzero(crossed >= 0)
         if len(rows):
-            j, each, flipped = crossed[rows], np.arange(len(rows)), pars[rows]
+            flipped = pars[rows]
             flipped[each, j] = -flipped[each, j]
             beyond = self._functions.looks(here[rows], times[rows], flipped)
             least = sides[rows, j] * np.array([look.rates[j, rows], beyond.rates[j, each]])
@@ -472,11 +476,10 @@ class SwitchingStepper(TaylorStepper):
             if self.has_events:
                 value, width = self._functions.crossings(here[rows], times[rows], pars[rows])
                 bad[rows] |= (np.abs(value) <= width).any(axis=0)
-        series = [(row, one.series) for row, one in enumerate(passed) if one.series is not None]
-        maybe = may_be_sparse(np.array([found for _, found in series])) if series else np.zeros(0)
-        for k in np.flatnonzero(maybe):
-            row, found = series[k]
-            bad[row] |= bound_of_sparse_series(found) < passed[row].size
+        fresh = [row for row, series in enumerate(kept) if series is not None]
+        maybe = may_be_sparse(np.array([kept[row] for row in fresh])) if fresh else np.zeros(0)
+        for row in np.array(fresh, dtype=int)[np.flatnonzero(maybe)].tolist():
+            bad[row] |= bound_of_sparse_series(kept[row]) < abs(float(sizes[row]))
         first = int(np.argmax(bad)) if bad.any() else len(passed)
         again = int(np.argmax(near)) + 1 if near.any() else len(passed)
         return min(first, again), first < again and first < len(passed)
@@ -651,8 +654,10 @@ class SwitchingStepper(TaylorStepper):
             self._enter()
             return True
         look = self._look(self.state, self.time, self._low)
-        on = dict.fromkeys([j, *self._along, *self._lying_on(look, before, self.state)])
-        return self._continues(self._chosen(list(on), hint=(j, side)), j)
+        on = list(dict.fromkeys([j, *self._along, *self._lying_on(look, before, self.state)]))
+        if on == [j] and Fields(self._at, on).crossed(side):
+            self._crossed = -self._crossed
+        return self._continues(self._chosen(on, hint=(j, side)), j)
 
     def _pass_knot(self, knot: tuple[Scalar, Scalar], before: np.ndarray) -> bool:
         """Continue from a moment known as written; False if that is impossible."""
