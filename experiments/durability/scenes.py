@@ -50,6 +50,28 @@ kind = "gravity_gradient"
 source = "sun"
 """
 """Its kernel's blocks end every 4 and every 16 days, which are 1 and 4 samples here."""
+PAIR = """
+[body]
+shape = "ellipsoid"
+mass = 5.24e11
+semi_axes = [431, 419, 310]
+[initial]
+angular_velocity = [1e-5, 0, 7.7e-4]
+[[rigid_bodies]]
+name = "moonlet"
+shape = "ellipsoid"
+mass = 4.8e9
+semi_axes = [103, 79, 66]
+position = [1190, 0, 0]
+velocity = [0, 0.1714, 0.001]
+angular_velocity = [0, 1e-6, 1.46e-4]
+[[loads]]
+kind = "mutual_gravity"
+degree = 4
+[[events]]
+name = "near"
+expression = "separation - 1125"
+"""
 DAYS = 86400
 KINKED = '[[loads]]\nkind = "torque"\ncomponents = ["0.01*sign(wx - 0.2)", "0.02*abs(sin(t))", "0"]\n'
 _ROWS = "".join(f"{100 * n}, 1000, {0.1 + 0.001 * (n % 7)}, 0.2, {3.16 * n:.2f}\n" for n in range(-42, 43))
@@ -77,6 +99,8 @@ SCENES = {
     "quadruple_dense": (80, 321, 'precision = "quadruple"', "", ""),
     "quadruple_events": (60, 61, 'precision = "quadruple"\nformulation = "rotation_matrix"', EVENT, ""),
     **MOONS,
+    "pair_double": (30 * DAYS, 2001, "", "", ""),
+    "pair_extended": (5 * DAYS, 601, 'precision = "extended"', "", ""),
     "double_kinked": (600, 601, "", KINKED + EVENT, ""),
     "double_table": (4000, 4001, "", TABLE, ""),
 }
@@ -92,7 +116,8 @@ def text_of(name: str, longer: int = 1) -> str:
     """
     end, samples, integrator, rest, output = SCENES[name]
     end *= longer
-    body, epoch = (MOON, 'epoch = "1969-06-28T00:00:00 TDB"\n') if name.startswith("moon") else (BODY, "")
+    body = {"moon": MOON, "pair": PAIR}.get(name.split("_")[0], BODY)
+    epoch = 'epoch = "1969-06-28T00:00:00 TDB"\n' * (body is MOON)
     return (
         f'name = "{name}"\n{body}{rest}[time]\n{epoch}end = {end}\nsamples = {samples}\n'
         # a run that may be stopped isn't refused where the disk is too small for all of it
