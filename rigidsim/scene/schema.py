@@ -679,6 +679,7 @@ class RigidBodyTable(Matter, Motion):
     """
 
     rules = (
+        *Matter.rules,
         excludes("orbit", "position", "velocity"),
         excludes("equilibrium", "orbit", "velocity", "angular_velocity"),
     )

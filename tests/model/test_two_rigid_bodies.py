@@ -333,6 +333,12 @@ BODY = "principal_moments = [1, 2, 2.5]\nmass = 1e10"
         ),
         (BODY, "degree = 2", MOON + MOON.replace('"b"', '"c"'), "given 2; at most 1"),
         (
+            BODY,
+            "degree = 2",
+            MOON.replace("mass", "density = 5\nmass"),
+            "number 1: given density without file",
+        ),
+        (
             f"{BODY}\ncenter_of_mass = [1, 0, 0]",
             "degree = 2",
             MOON,
@@ -524,9 +530,11 @@ def test_two_spheres_that_fall_together_touch_when_kepler_says() -> None:
 
 
 def test_bodies_within_each_other_are_refused() -> None:
-    text = didymos(DIMORPHOS.replace("1190", "370") + "angular_velocity = [0, 0, 0]")
-    with pytest.raises(rigidsim.ConfigError, match="places the bodies into each other"):
-        prepare(rigidsim.parse(text))
+    for start in ('equilibrium = "synchronous"', "angular_velocity = [0, 0, 0]"):
+        prepare(rigidsim.parse(didymos(DIMORPHOS.replace("1190", "529") + start, load="degree = 2")))
+        text = didymos(DIMORPHOS.replace("1190", "528") + start, load="degree = 2")
+        with pytest.raises(rigidsim.ConfigError, match=r"position: given 528\.0 m.*more than 528\.16 m"):
+            prepare(rigidsim.parse(text))
 
 
 @pytest.mark.slow

@@ -451,6 +451,19 @@ class SecondBody(Load):
         gap = 1.0 / (attracting.inverse * hy.sum(reached)) - 1.0
         return [(f"the ellipsoids with the moments of [body] and {self.name} touch", gap)]
 
+    def refuse_overlap(self, scene: Scene) -> None:
+        """Refuse a start at which both ellipsoids overlap along that line."""
+        context, place = scene.context, self.start.position
+        far, reached = norm(context, place), context.zero
+        turns = [attitude.rotation_matrix(q) for q in (scene.quaternion, self.start.quaternion)]
+        for body, axes, turn in zip((self.first, self.body), self.semi_axes, turns, strict=True):
+            seen = apply(transpose(turn), [x / far for x in place])
+            along = [dot(axis, seen) / a for axis, a in zip(body.principal_axes, axes, strict=True)]
+            reached += 1 / norm(context, along)
+        what = f"given {context.nstr(far, 6)} m from [body], where the ellipsoids with the moments of both overlap; "
+        what += f"place it more than {context.nstr(reached, 6)} m away, or turn one of both"
+        ensure(far > reached, self.fault("position", what))
+
     # --- its states -----------------------------------------------------------------------------------------
 
     def seen(self, m: Kinematics) -> SecondStates:
@@ -490,6 +503,7 @@ class SecondBody(Load):
 
     def extra_states(self, m: Kinematics) -> StateBlock:
         context, names, scaling, start = m.scene.context, self.states, m.scaling, self.start
+        self.refuse_overlap(m.scene)
         seen, (far, speed, turning) = self.seen(m), self.units(m.scene)
         ratio = m.scaled(1, speed + scaling.time - far)
         accelerations: list[Any] = [hy.expression(0.0)] * 3
@@ -577,9 +591,6 @@ class SecondBody(Load):
         )
         whole = f"{what}component zero"
         ensure(not along_massless(body, made.start.rates), around.fault("angular_velocity", whole))
-        near = sum(min(axes) for axes in made.semi_axes)
-        what = f"places the bodies into each other, {context.nstr(near, 6)} m and more apart are allowed"
-        ensure(norm(context, made.start.position) > near, around.fault("position", what))
         return made
 
 
