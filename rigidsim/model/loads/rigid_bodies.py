@@ -460,8 +460,8 @@ class SecondBody(Load):
             seen = apply(transpose(turn), [x / far for x in place])
             along = [dot(axis, seen) / a for axis, a in zip(body.principal_axes, axes, strict=True)]
             reached += 1 / norm(context, along)
-        what = f"given {context.nstr(far, 6)} m from [body], where the ellipsoids with the moments of both overlap; "
-        what += f"place it more than {context.nstr(reached, 6)} m away, or turn one of both"
+        what = f"given {context.nstr(far, 6)} m from [body], where the ellipsoids with the moments of both "
+        what += f"overlap; place it more than {context.nstr(reached, 6)} m away, or turn one of both"
         ensure(far > reached, self.fault("position", what))
 
     # --- its states -----------------------------------------------------------------------------------------
