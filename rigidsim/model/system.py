@@ -23,6 +23,8 @@ from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.impulses import Kick, kicks_of
 from rigidsim.model.kinematics import Poles
 from rigidsim.model.load import Load
+from rigidsim.model.loads.rigid_bodies import second_body
+from rigidsim.model.loads.tides_on_pairs import sources_of
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.names import above_zero, carries_sign, plain_angles, written
 from rigidsim.model.observables.mechanical import WATCHED, WORK
@@ -111,8 +113,10 @@ def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list
 
 
 def _conserved(m: Mechanics, observable: Observable) -> str | None:
-    """Why it stays, if it does: across an impulse nothing but norms."""
-    return None if m.scene.impulses and observable.units != "1" else observable.conserved(m)
+    """Why it stays, if it does: of two bodies under tides the energy less the work, across impulses norms."""
+    tides = second_body(m.scene) is not None and sources_of(m.scene)
+    watched = not m.scene.impulses and (not tides or observable.name == BALANCE[1])
+    return observable.conserved(m) if watched or observable.units == "1" else None
 
 
 def _of_state(m: Mechanics, state: OwnState) -> Observable:

@@ -30,6 +30,7 @@ import numpy as np
 from rigidsim.errors import ensure, required
 from rigidsim.model.harmonics import turning
 from rigidsim.model.loads.rigid_bodies import Attracting, SecondBody, second_body
+from rigidsim.model.loads.tides_on_pairs import sources_of
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import (
     Matrix,
@@ -255,13 +256,14 @@ def _found(scene: Scene, second: SecondBody, name: str, both: bool) -> InitialRo
         if axes.averaged
         else ""
     )
+    mean += "; distant sources aren't part of it" if sources_of(scene) else ""
     found = FoundStart(
         name=name,
         described=f"{name} equilibrium, {context.nstr(at.rate, 18)} rad/s, a turn in {hours} h: "
         f"{'stable' if stable else 'unstable'}{mean}",
         how="by Newton's method on the full equations, of which it is an exact solution"
         if not mean
-        else "by Newton's method on equations averaged over a turn of [body]",
+        else "by Newton's method on the equations without what doesn't rest",
         exponents=exponents,
         stable=stable,
     )

@@ -345,6 +345,13 @@ BODY = "principal_moments = [1, 2, 2.5]\nmass = 1e10"
             "[body] center_of_mass: turns about another",
         ),
         (BODY, 'degree = 2\n[[loads]]\nkind = "uniform_gravity"', MOON, 'kind: given "uniform_gravity"'),
+        (
+            BODY,
+            'degree = 2\n[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 1\n'
+            "position = [9, 0, 0]\nfigure = {J2 = 0.1, radius = 1, pole = [0, 0, 1]}",
+            MOON,
+            "[[loads]] number 2 figure: given with [[rigid_bodies]]",
+        ),
         (BODY, 'degree = 2\n[model]\nlevel = "spin_averaged"', MOON, "rigid body b carries angular momentum"),
         (BODY, 'degree = 2\n[[loads]]\nkind = "mutual_gravity"', MOON, "number 2 kind: given twice"),
     ],
@@ -359,6 +366,72 @@ def test_formulations_that_know_one_body_alone_are_refused(formulation: str) -> 
     text = pair(2, time="end = 5\nsamples = 2", integrator=f'formulation = "{formulation}"')
     with pytest.raises(rigidsim.ConfigError, match=r"reads the attitude|carries angular momentum"):
         prepare(rigidsim.parse(text))
+
+
+# --- distant sources ----------------------------------------------------------------------------------------
+
+
+def attracted(
+    body: np.ndarray, tensor: np.ndarray, mass: float, source: np.ndarray, place: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Acceleration of a body (rotation matrix, tensor), and torque on it, its axes, by a unit source: of
+    the potential -m / d - (tr I - 3 c . I c) / 2 d^3 (MacCullagh), in 40 digits.
+    """
+    with mpmath.workdps(40):
+        number = np.vectorize(mpmath.mpf)
+        inertia, d = number(body) @ number(tensor) @ number(body.T), number(source) - number(place)
+        far = mpmath.sqrt(d @ d)
+        c = d / far
+        turned = inertia @ c
+        radial = 1 / far**2 + 3 * (np.trace(inertia) - 5 * (c @ turned)) / (2 * mpmath.mpf(mass) * far**4)
+        force = radial * c + (3 / (mpmath.mpf(mass) * far**4)) * turned
+        return force, (3 / far**3) * number(body.T) @ np.cross(c, turned)
+
+
+@pytest.mark.parametrize("seed", seeds(2, 40))
+def test_a_distant_source_moves_both_bodies(seed: int) -> None:
+    """At any distance, from a near planet's to the Sun's: all rates change by two one-body formulas."""
+    random = Random(seed)
+    one, other = Points.drawn(random), Points.drawn(random)
+    place, far = np.array([2.5, 0.4, 1.1]), 10.0 ** random.generator.uniform(1.5, 8)
+    source = far * random.vector()
+    strength = float(far**3)
+    text = scene(one.keys, other.keys, 2, place)
+    load = f'[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = {strength!r}\n'
+    load += f"position = {source.tolist()}\n"
+    qs, found = [random.quaternion(), random.quaternion()], []
+    for given in (text, f"{text}\n{load}"):
+        system = prepare(rigidsim.parse(given)).system
+        known = dict.fromkeys(system.states, 0.0) | dict(zip(("qw", "qx", "qy", "qz"), qs[0], strict=True))
+        known |= dict(zip(NAMES[:3], place, strict=True)) | dict(zip(NAMES[6:10], qs[1], strict=True))
+        state = np.array([known[name] for name in system.states])
+        found.append(dict(zip(system.states, derivative(system, state), strict=True)))
+    moved = {name: found[1][name] - found[0][name] for name in found[0]}
+    (a, on_one), (b, on_other) = (
+        attracted(matrix(q), body.inertia, body.mass, source, away)
+        for q, body, away in zip(qs, (one, other), (np.zeros(3), place), strict=True)
+    )
+    with mpmath.workdps(40):
+        tide = (strength * (b - a)).astype(float)
+    own = np.array([found[0][name] for name in NAMES[3:6]])
+    apart = np.array([moved[name] for name in NAMES[3:6]]) - tide
+    assert np.linalg.norm(apart) < 4e-15 * (np.linalg.norm(tide) + np.linalg.norm(own))
+    for body, torque, names in ((one, on_one, ("wx", "wy", "wz")), (other, on_other, NAMES[10:])):
+        change = np.linalg.solve(body.inertia, strength * torque.astype(float))
+        before = np.linalg.norm([found[0][name] for name in names])
+        off = np.linalg.norm(np.array([moved[name] for name in names]) - change)
+        assert off < 1e-14 * (np.linalg.norm(change) + before)
+
+
+def test_energy_balances_the_work_of_a_source() -> None:
+    """Of a planet on an eccentric orbit, by which energy and momentum of the pair change."""
+    orbit = "orbit = {semi_major_axis = 30, eccentricity = 0.2, inclination = 0.5, mean_anomaly = 2}"
+    load = f'\n[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 20\n{orbit}\n'
+    data = loaded(run_text(pair(4, time="end = 100\nsamples = 21") + load))
+    assert np.abs(data["energy_balance_drift"]).max() < 2e-13
+    energy = data["energy"].values
+    assert np.ptp(energy) > 1e-3 * np.abs(energy).max()
+    assert not {"energy_drift", "angular_momentum_drift"} & {*data}
 
 
 # --- equilibria ---------------------------------------------------------------------------------------------

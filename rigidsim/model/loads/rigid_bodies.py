@@ -49,6 +49,7 @@ from rigidsim.errors import ConfigError, Problem, ensure, required
 from rigidsim.model.harmonics import Harmonics, Series, leading
 from rigidsim.model.kinematics import ConstantInertia, Kinematics, along_axes, in_common_unit
 from rigidsim.model.load import Load, Term
+from rigidsim.model.loads.tides_on_pairs import Second, Tides, tides_on
 from rigidsim.model.rotations import Symbolic, length, quaternion_kinematics, quaternion_matrix
 from rigidsim.model.scaling import exponent
 from rigidsim.model.state_blocks import RotatingBody, StateBlock
@@ -61,7 +62,7 @@ from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, kepler_reach, start_of_elements
 from rigidsim.scene.readable import length_text
-from rigidsim.scene.registry import LoadFields, Setting, register_load
+from rigidsim.scene.registry import LOADS, LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene, whole_body
 from rigidsim.scene.schema import RigidBodyTable
 from rigidsim.scene.starts import along_massless
@@ -512,6 +513,9 @@ class SecondBody(Load):
             size = context.ldexp(1 / self.reduced_mass, scaling.energy - far + scaling.time - speed)
             accelerations = [m.number(size) * x for x in attracting.force]
             torque = along_axes(m, 1, 0, attracting.torques[1])
+        if (tides := self._tides(m)) is not None:
+            accelerations = [x + y for x, y in zip(accelerations, tides.acceleration, strict=True)]
+            torque = [*torque, *tides.torque]
         unit = context.ldexp(context.one, turning + scaling.time)
         derivatives = [ratio * v for v in seen.velocity] + accelerations
         derivatives += quaternion_kinematics(seen.quaternion, seen.rates)
@@ -547,8 +551,26 @@ class SecondBody(Load):
         attracting = self.seen(m).attracting
         return [] if attracting is None else along_axes(m, m.scene.context.one, 0, attracting.torques[0])
 
-    def supplied_power(self, m: Kinematics) -> None:
-        return None
+    def supplied_power(self, m: Kinematics) -> Symbolic | None:
+        """Of distant sources on its rotation and on the orbit."""
+        tides, seen, (_, speed, _) = self._tides(m), self.seen(m), self.units(m.scene)
+        if tides is None:
+            return None
+        moving = m.scaled(self.reduced_mass, 2 * speed - m.scaling.energy)
+        terms = [moving * a * v for a, v in zip(tides.acceleration, seen.velocity, strict=True)]
+        for vector, expression in tides.torque:
+            pairs = zip(vector, seen.rates, strict=True)
+            terms.append(expression * hy.sum([m.number(x) * w for x, w in pairs if x != 0]))
+        return hy.sum(terms)
+
+    def _tides(self, m: Kinematics) -> Tides | None:
+        key = "tides", self.name
+        if key not in m.made:
+            seen, (far, speed, _) = self.seen(m), self.units(m.scene)
+            states = Second(self.states, self.body, seen.place, seen.quaternion, seen.matrix, far, speed)
+            m.made[key] = tides_on(states, m)
+        found: Tides | None = m.made[key]
+        return found
 
     def carried_at_start(self, scene: Scene) -> tuple[Vector, Any]:
         start, moving = self.start, cross(self.start.position, self.start.velocity)
@@ -595,7 +617,7 @@ class SecondBody(Load):
 
 
 _NO_MASS = "missing; two bodies need both masses, which decide how far each moves"
-_ALLOWED = ("mutual_gravity", "torque", "viscous_torque")
+_ALLOWED = ("mutual_gravity", "gravity_gradient", "torque", "viscous_torque")
 
 
 def _refuse_what_one_body_has(around: Setting) -> None:
@@ -614,7 +636,14 @@ def _refuse_what_one_body_has(around: Setting) -> None:
     for number, load in enumerate(config.loads):
         what = f'given "{load.kind}", which would act on [body] alone; '
         what += f"with [[{_TABLE}]] allowed: {', '.join(_ALLOWED)}"
-        ensure(load.kind in _ALLOWED, around.at("loads", number).fault("kind", what))
+        here = around.at("loads", number)
+        ensure(load.kind in _ALLOWED, here.fault("kind", what))
+        if isinstance(load, MutualGravityFields):
+            continue
+        beside = [key for key in LOADS["beside"] if getattr(load, key, None) not in (None, 2)]
+        what = f"given with [[{_TABLE}]]; distant sources act on both tensors of inertia alone: remove it"
+        for key in beside:
+            raise here.fault(key, what)
 
 
 def _built(fields: RigidBodyTable, around: Setting) -> RigidBody:
