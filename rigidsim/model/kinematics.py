@@ -48,7 +48,7 @@ from rigidsim.scene.arithmetic import Matrix, Vector, cross, diagonal, dot, negl
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import Expression
-from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
+from rigidsim.scene.orbit_tables import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.rotations import AXES, is_proper, outer_angles, parity, pole_side, shared_turn
 from rigidsim.scene.scene import Scene

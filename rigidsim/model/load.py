@@ -21,7 +21,7 @@ from rigidsim.model.si import speaks_si
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.cautions import Caution
-from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
+from rigidsim.scene.orbit_tables import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.registry import SceneLoad
 from rigidsim.scene.scene import Scene

@@ -77,7 +77,7 @@ from rigidsim.scene.arithmetic import bits_in_use, cosine_and_sine
 from rigidsim.scene.kepler import regular_place
 from rigidsim.scene.kernels.reading import Ephemeris, RelativeEphemeris
 from rigidsim.scene.kernels.series import BlockSeries, chebyshev, exactly
-from rigidsim.scene.orbit_tables.pieces import AXIS, LONGITUDE, TabulatedOrbit
+from rigidsim.scene.orbit_tables import AXIS, LONGITUDE, TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.point_masses import PointMasses
 from rigidsim.scene.scene import Scene

@@ -36,7 +36,7 @@ from rigidsim.scene.arithmetic import Vector, cross, minus, norm
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.kernels.reading import Ephemeris, RelativeEphemeris
-from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
+from rigidsim.scene.orbit_tables import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, PointMasses, closest, kepler_reach
 from rigidsim.scene.registry import Setting

@@ -38,7 +38,7 @@ from rigidsim.model.step_limiter import pace_block
 from rigidsim.model.tangents import GROWTH, tangent_block
 from rigidsim.scene.expressions.names import EULER_NAMES
 from rigidsim.scene.expressions.tree import bounds
-from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
+from rigidsim.scene.orbit_tables import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import OwnState

@@ -2,7 +2,7 @@
 
 Classical elements give unit vectors P towards the pericentre and T across it, in the direction of motion, so
 that the place is a ((cos E - e) P + sqrt(1 - e^2) sin E T) (Murray & Dermott 1999, section 2.8). Elements
-without singularities are in ``rigidsim.scene.orbit_tables.pieces``.
+without singularities are in ``rigidsim.scene.orbit_tables``.
 """
 
 from __future__ import annotations

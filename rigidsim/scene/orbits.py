@@ -37,8 +37,7 @@ from rigidsim.scene.fields import (
     together,
 )
 from rigidsim.scene.kepler import Ellipse, combined, plane_vectors
-from rigidsim.scene.orbit_tables.elements import read_table
-from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
+from rigidsim.scene.orbit_tables import TabulatedOrbit, read_table
 from rigidsim.scene.registry import LoadFields, Setting
 from rigidsim.scene.space_axes import ECLIPTIC, obliquity, to_ecliptic, to_equator
 from rigidsim.scene.swept import Swept, SweptExact, Untraceable

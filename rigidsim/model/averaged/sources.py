@@ -102,7 +102,7 @@ from rigidsim.scene.arithmetic import (
     transpose,
 )
 from rigidsim.scene.kepler import eccentric_anomalies, plane_vectors, turned
-from rigidsim.scene.orbit_tables.pieces import AXIS
+from rigidsim.scene.orbit_tables import AXIS
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 
@@ -204,7 +204,7 @@ def nutation(
 def place_by_elements(
     functions: Any, elements: Mapping[str, Any], anomaly: Any, periapsis: Any
 ) -> OrbitPlace:
-    """The place of an eccentric anomaly, by elements q and p of ``rigidsim.scene.orbit_tables.pieces``."""
+    """The place of an eccentric anomaly, by elements q and p of ``rigidsim.scene.orbit_tables``."""
     q, p = elements["q"], elements["p"]
     chi, product = functions.sqrt(1.0 - p * p - q * q), 2 * p * q
     axes = [1 - 2 * p * p, product, -2 * p * chi], [product, 1 - 2 * q * q, 2 * q * chi]

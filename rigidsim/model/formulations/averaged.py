@@ -38,7 +38,7 @@ from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.arithmetic import cosine_and_sine, cross, dot, transpose
 from rigidsim.scene.choices import Variables
 from rigidsim.scene.kepler import plane_vectors
-from rigidsim.scene.orbit_tables.pieces import AXIS, TabulatedOrbit
+from rigidsim.scene.orbit_tables import AXIS, TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 

@@ -60,7 +60,7 @@ from rigidsim.scene.arithmetic import Vector, apply, cross, dot, multiply, negli
 from rigidsim.scene.attitude import rotation_matrix
 from rigidsim.scene.choices import DEFAULT_FORMULATION, FORMULATIONS, Variables
 from rigidsim.scene.expressions.tree import readables
-from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
+from rigidsim.scene.orbit_tables import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.registry import register_class
 from rigidsim.scene.rotations import AXES, is_proper, parity

@@ -1,37 +1,375 @@
-"""Tabulated orbits in elements without singularities, interpolated over time.
+"""Orbits given by tables of elements over time: the tables, and the interpolation between their rows.
 
-With longitude of periapsis pi, node W and inclination i they are (Broucke & Cefalu 1972, Celestial Mechanics
-5, 303, with sin(i/2) in place of the tangent)
+A table has names with units, then one row for each time.
+
+    # comments begin with a hash
+    time [kyr], semi_major_axis [au], eccentricity, inclination [deg], ascending_node [deg]
+    0, 1.523679, 0.0934, 1.85, 49.56
+    1, 1.523679, 0.0943, 1.84, 49.27
+
+A column without a unit is in SI (radians). Programs that integrate the solar system write tables without
+names: ``FORMATS`` has their columns, of which the mean anomalies are left out, since rows are centuries
+apart. Their rows begin with the first line of as many numbers, with an eccentricity below 1.
+
+Numbers keep their digits in mpf. For scenes of at most double precision they are read in 80 bits, in a
+hundredth of the time; elements with an anomaly, which counts millions of turns, stay mpf.
+
+An orbit has elements without singularities. With longitude of periapsis pi, node W and inclination i they are
+(Broucke & Cefalu 1972, Celestial Mechanics 5, 303, with sin(i/2) in place of the tangent)
 
     k = e cos pi, h = e sin pi,   q = sin(i/2) cos W, p = sin(i/2) sin W,   a,   mean longitude l = M + pi.
 
 They are smooth where e or i passes zero, and angles that turn need not be unwrapped, but for the mean
-longitude: its whole turns between two rows follow from Kepler's third law, or the table is refused. Between
-rows all are interpolated (``rigidsim.scene.orbit_tables.interpolation``). Without a column of the anomaly
-the mean longitude advances at the rate of Kepler's third law, or of ``period``.
+longitude: its whole turns between two rows follow from Kepler's third law, or the table is refused. Without a
+column of the anomaly the mean longitude advances at the rate of Kepler's third law, or of ``period``.
+
+Between rows elements are polynomials of fifth degree. Each has the rows' values and, at both ends, the first
+and second derivatives of the polynomial through the seven nearest rows (as many as there are, in shorter
+tables), so that the whole is twice differentiable. A piece depends on eight rows around it. Where the rows
+follow a smooth function, errors fall with the sixth power of their distance. (Differentiation
+matrices: Welfert 1997, SIAM J. Numer. Anal. 34, 1640.) Errors are measured by leaving out and interpolating
+every other row.
 """
 
+from __future__ import annotations
+
+import math
+import re
+import warnings
 from bisect import bisect_right
-from collections.abc import Callable, Mapping
-from functools import cached_property
+from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import islice
 from typing import Any
 
+import mpmath
 import numpy as np
 
 from rigidsim.scene.arithmetic import Matrix, eccentric_anomaly
-from rigidsim.scene.kepler import regular_place
-from rigidsim.scene.orbit_tables.elements import FEWEST_ROWS, REGULAR, ElementTable
-from rigidsim.scene.orbit_tables.interpolation import (
-    AXIS,
-    EXCENTRIC,
-    LONGITUDE,
-    TILTED,
-    Interpolation,
-    InterpolationError,
-    in_80_bits,
-    interpolation_error,
-)
-from rigidsim.scene.text_tables import TableError
+from rigidsim.scene.exact import parse_number
+from rigidsim.scene.kepler import eccentric_anomalies, regular_place
+from rigidsim.scene.text_tables import TableError, TextTable, as_number, name_and_unit, open_table
+from rigidsim.scene.validation_messages import nearest, shown
+
+AXIS, LONGITUDE = "axis", "longitude"
+EXCENTRIC, TILTED = ("k", "h"), ("q", "p")
+_LARGEST_ERROR = 0.1  # rad, of the direction when every other row is left out
+NEAREST = 7
+_MOST_ROWS = 4096
+
+
+class Interpolation:
+    """Interpolation between rows of ``values`` (rows, columns), which are ``lengths`` (rows - 1,) apart: of
+    floats, or of mpf in arrays of objects.
+    """
+
+    def __init__(self, lengths: np.ndarray, values: np.ndarray) -> None:
+        self.lengths, self.values = lengths, values
+        self._even = bool((lengths == lengths[:1]).all())
+
+    def narrowed(self) -> Interpolation:
+        """The same in the platform's longest floating point, of at least double precision."""
+        return Interpolation(in_80_bits(self.lengths), in_80_bits(self.values))
+
+    def pieces(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of pieces (n,) lengths (n,), and coefficients (n, 6, columns) of the powers of
+        (t - t_i) / (t_{i+1} - t_i). Floats must not grow beyond order one.
+        """
+        lengths, values, count = self.lengths, self.values, min(NEAREST, len(self.values))
+        rows, ends = np.unique(np.stack([numbers, numbers + 1]), return_inverse=True)
+        first = np.clip(rows - count // 2, 0, len(values) - count)
+        near, here = first[:, None] + np.arange(count), rows - first
+        # rows at equal distances have equal weights, but near the table's ends
+        alike, same = np.unique(here, return_index=True, return_inverse=True)[1:]
+        if not self._even:
+            alike, same = np.arange(len(rows)), np.arange(len(rows))
+        steps = np.cumsum(lengths[near[alike, :-1]], axis=1)  # from the first of the rows around
+        offsets = np.concatenate([np.zeros((len(alike), 1), lengths.dtype), steps], axis=1)
+        place = here[alike, None]
+        offsets = offsets - np.take_along_axis(offsets, place, axis=1)
+        around = values[near]
+        d, s = (np.einsum("ni,nic->nc", w[same], around)[ends] for w in _weights(offsets, place))
+        length = lengths[numbers]
+        y0, y1, step = values[numbers], values[numbers + 1], length[:, None]
+        a, b = d[0] * step, s[0] * step * step / 2
+        # remainder at the far end for the powers 3 to 5: value, derivative, and half the second derivative
+        u, v, w = y1 - (y0 + a + b), d[1] * step - (a + b * 2), s[1] * step * step / 2 - b
+        powers = [y0, a, b, u * 10 - v * 4 + w, v * 7 - u * 15 - w * 2, u * 6 - v * 3 + w]
+        return length, np.stack(powers, axis=1)
+
+
+def in_80_bits(exact: np.ndarray) -> np.ndarray:
+    """Numbers (mpf, in an array of objects) in the platform's longest floating point."""
+    if exact.dtype != object:
+        return exact
+    high = exact.astype(np.float64)
+    return high.astype(np.longdouble) + (exact - high).astype(np.float64)
+
+
+def _weights(offsets: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Weights of values at offsets (..., n) in the first and second derivative where one of them, of index
+    ``here``, is zero.
+    """
+    apart = offsets[..., :, None] - offsets[..., None, :]
+    apart[..., np.arange(offsets.shape[-1]), np.arange(offsets.shape[-1])] = 1
+    products = apart.prod(axis=-1)
+    inner = -offsets  # from the others to the row itself
+    np.put_along_axis(inner, here, 1, axis=-1)
+    one = np.take_along_axis(products, here, axis=-1) / (products * inner)
+    np.put_along_axis(one, here, 0, axis=-1)
+    centre = -one.sum(axis=-1, keepdims=True)
+    two = 2 * one * (centre - 1 / inner)
+    np.put_along_axis(one, here, centre, axis=-1)
+    np.put_along_axis(two, here, 0, axis=-1)
+    np.put_along_axis(two, here, -two.sum(axis=-1, keepdims=True), axis=-1)
+    return one, two
+
+
+def left_out(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Every other row's number, and values (rows, columns) interpolated there from the others, in float64."""
+    kept = Interpolation(np.diff(times[::2]), values[::2])
+    rows = np.arange(1, 2 * len(kept.values) - 2, 2)
+    lengths, parts = kept.pieces(rows // 2)
+    x = ((times[rows] - times[rows - 1]) / lengths)[:, None]
+    c = np.moveaxis(parts, 1, 0)
+    return rows, ((((c[5] * x + c[4]) * x + c[3]) * x + c[2]) * x + c[1]) * x + c[0]
+
+
+@dataclass(frozen=True)
+class InterpolationError:
+    """Largest errors of the source's direction (rad) and, relative, of its distance when every other row is
+    left out; with all rows both shrink by a factor, ``expected`` where they follow smooth functions.
+    """
+
+    direction: float
+    distance: float
+    expected: float = 2.0**-6  # an error of the sixth order
+
+
+def interpolation_error(
+    times: np.ndarray, elements: Mapping[str, Any], moving: Collection[str]
+) -> InterpolationError:
+    """Measure errors of a table with ``elements``: arrays (rows,) if ``moving``, else numbers.
+
+    Raises:
+        TableError: rows are so far apart that the table means little between them.
+    """
+    seconds = (times - times[0]).astype(np.float64)
+    exact = {name: np.broadcast_to(np.asarray(x, dtype=np.float64), seconds.shape)
+             for name, x in elements.items() if name != LONGITUDE}  # fmt: skip
+    timed = LONGITUDE in moving
+    if timed:
+        values = elements[LONGITUDE] - elements[LONGITUDE][0]
+        linear = values[-1] / (times[-1] - times[0])
+        exact[LONGITUDE] = (values - linear * (times - times[0])).astype(np.float64)
+    rows, found = left_out(seconds, np.array([exact[name] for name in moving]).T)
+    if len(rows) > _MOST_ROWS:  # of many those where elements are most in error
+        given = np.array([exact[name][rows] for name in moving]).T
+        sizes = np.abs((found - given) / np.maximum(np.abs(given).max(axis=0), 1e-300)).max(axis=1)
+        worst = np.sort(np.argpartition(sizes, -_MOST_ROWS)[-_MOST_ROWS:])
+        rows, found = rows[worst], found[worst]
+    guessed = {name: values[rows] for name, values in exact.items()}
+    tabulated = dict(guessed)
+    for i, name in enumerate(moving):
+        guessed[name] = found[:, i]
+    direction = distance = 0.0
+    # if the anomaly isn't tabulated, the worst of several places on the orbit counts
+    phases = [0.0] if timed else [i * math.pi / 4 for i in range(8)]
+    base = np.zeros(len(rows))
+    if timed:
+        turn = 2 * times[0].context.pi
+        base = (elements[LONGITUDE][rows] % turn).astype(np.float64)
+    for phase in phases:
+        shift = guessed.get(LONGITUDE, 0.0) - tabulated.get(LONGITUDE, 0.0)
+        one, r_one = _places(tabulated, base + phase)
+        two, r_two = _places(guessed, base + phase + shift)
+        direction = max(direction, float(np.linalg.norm(one - two, axis=0).max()))
+        distance = max(distance, float(np.abs(r_two / r_one - 1).max()))
+    if not direction <= _LARGEST_ERROR:
+        raise TableError(
+            f"its rows are too far apart: with every other row left out, interpolation misses the "
+            f"direction by {direction:.2g} rad; {_LARGEST_ERROR} or less is allowed: give more rows"
+        )
+    return InterpolationError(direction, distance)
+
+
+def _places(elements: Mapping[str, np.ndarray], longitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors (3, n) and distances (n,) of regular elements, in double precision."""
+    regular = tuple(elements[name] for name in (*EXCENTRIC, *TILTED))
+    k, h = regular[:2]
+    periapsis = np.arctan2(h, k)
+    eccentric = eccentric_anomalies(longitude - periapsis, np.hypot(k, h)) + periapsis
+    turn = np.cos(eccentric), np.sin(eccentric)
+    r = 1 - k * turn[0] - h * turn[1]
+    return np.array(regular_place(np, regular, turn, 1 / r)), r * elements[AXIS]
+
+
+# --- tables -------------------------------------------------------------------------------------------------
+
+
+TIME = "time"
+_ANGLES = (
+    "inclination", "ascending_node", "periapsis", "longitude_of_periapsis", "mean_anomaly", "mean_longitude"
+)  # fmt: skip
+UNITS = {TIME: "s", "semi_major_axis": "m", "eccentricity": "1"} | dict.fromkeys(_ANGLES, "rad")
+"""Columns that a table may have, with the SI units into which they are read."""
+REGULAR = ("k", "h", "q", "p")
+"""Columns in place of eccentricity and angles."""
+_PLANE = "inclination [deg], "
+_LEFT_OUT = "-"
+FORMATS: Mapping[str, str] = {
+    "hnbody": f"time [day], semi_major_axis [au], eccentricity, {_PLANE}longitude_of_periapsis [deg], "
+    "ascending_node [deg], -, -",
+    "orbitn": f"time [day], semi_major_axis [au], eccentricity, {_PLANE}-, ascending_node [deg], "
+    "longitude_of_periapsis [deg], -",
+    "vplanet": f"time [yr], semi_major_axis [au], eccentricity, {_PLANE}periapsis [deg], "
+    "ascending_node [deg], -",
+    "la2010": "time [kyr], semi_major_axis [au], -, k, h, q, p",
+}
+"""Columns of tables without names: as HNBody writes them for snvec (Zeebe & Lourens 2022), as orbitN does
+(Zeebe 2023), as VPLanet's DistRot reads them (Deitrick et al. 2018), and of La2010 (Laskar et al. 2011).
+"""
+FEWEST_ROWS = 8
+"""Least number of rows, so that every other row still suffices for a check of the interpolation."""
+_DECIMAL = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d{1,3})?")
+_IN_DECIMALS = frozenset("0123456789+-.eE")
+_PLAIN = b"0123456789+-.eE \t\n"
+_LONGEST_CELL = 400
+
+
+@dataclass(frozen=True)
+class ElementTable:
+    """Numbers of a table, SI, in arrays (rows,) of mpf or of 80 bits: ascending times, and other columns."""
+
+    times: np.ndarray
+    columns: Mapping[str, np.ndarray]
+    context: Any
+
+
+@lru_cache(8)
+def read_table(text: str, bits: int, *, narrow: bool = False, format: str | None = None) -> ElementTable:
+    """Read a table's text; ``TableError`` names the line at fault.
+
+    Args:
+        bits: of the numbers.
+        narrow: whether 80 bits suffice for elements without an anomaly.
+        format: a key of ``FORMATS`` for a table without names.
+    """
+    context = mpmath.MPContext()
+    context.prec = bits
+    table = open_table(text.splitlines) if format is None else _of_format(text, format)
+    factors = {name: factor.at(context) for name, factor in _factors(table, format).items()}
+    narrow = narrow and not {"mean_anomaly", "mean_longitude"} & {*factors}
+    lines, values = _numbers(table, list(factors), context, narrow=narrow)
+    if len(lines) < FEWEST_ROWS:
+        raise TableError(f"has {len(lines)} rows; {FEWEST_ROWS} or more are needed to interpolate")
+    scales = np.array(list(factors.values()), dtype=object)
+    values = values * (in_80_bits(scales) if narrow else scales)
+    if values[0, 0] > values[-1, 0]:
+        lines, values = lines[::-1], values[::-1]
+    back = np.flatnonzero(values[1:, 0] <= values[:-1, 0])
+    if len(back):
+        raise TableError(f"line {max(lines[back[0] : back[0] + 2])}: its time doesn't continue the order of "
+                         "the rows before; times must ascend, or descend, from row to row")  # fmt: skip
+    columns = dict(zip(factors, np.ascontiguousarray(values.T), strict=True))
+    for name in [name for name in columns if name.startswith(_LEFT_OUT)]:
+        del columns[name]
+    return ElementTable(columns.pop(TIME), columns, context)
+
+
+def _numbers(
+    table: TextTable, names: list[str], context: Any, *, narrow: bool
+) -> tuple[list[int], np.ndarray]:
+    """Numbers of the lines, and the numbers in them (rows, columns) as they are written."""
+    if narrow and (plain := _plain_numbers(table)) is not None:
+        return list(range(table.head + 1, table.head + 1 + len(plain))), plain
+    rows = list(table.rows())
+    flat = [cell for _, cells in rows for cell in cells]
+    found = None
+    if "," in (text := "".join(flat)):
+        flat = [table.plain(cell) for cell in flat]
+        text = "".join(flat)
+    if narrow and _IN_DECIMALS.issuperset(text):
+        with suppress(ValueError):  # the line at fault is found below
+            found = np.array(flat, dtype="S").astype(np.longdouble)
+    if found is None or not np.isfinite(found).all():
+        for number, cells in rows:
+            for name, cell in zip(names, map(table.plain, cells), strict=True):
+                if len(cell) > _LONGEST_CELL or _DECIMAL.fullmatch(cell) is None:
+                    raise TableError(f"line {number}: given {shown(cell)} as {name}; a decimal number is "
+                                     "allowed, without a unit (the line of names has it)")  # fmt: skip
+        found = np.array([context.mpf(cell) for cell in flat], dtype=object)
+        found = in_80_bits(found) if narrow else found
+    return [number for number, _ in rows], found.reshape(len(rows), len(names))
+
+
+def _plain_numbers(table: TextTable) -> np.ndarray | None:
+    """Numbers (rows, columns) of lines that hold nothing else, between white space, in a fifth of the time;
+    None of other lines.
+    """
+    text, count = "\n".join([*islice(table.lines(), table.head, None), ""]), len(table.names)
+    data = text.encode()
+    if table.separator or data.translate(None, _PLAIN):
+        return None
+    gap = np.frombuffer(b" " + data, dtype=np.uint8) <= ord(" ")
+    begins, lines = np.flatnonzero(gap[:-1] & ~gap[1:]), np.flatnonzero(gap[1:])
+    ends = lines[np.frombuffer(data, dtype=np.uint8)[lines] == ord("\n")]
+    if (np.diff(np.searchsorted(begins, ends), prepend=0) != count).any():
+        return None
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", DeprecationWarning)  # of what is no number
+        with suppress(DeprecationWarning, ValueError):
+            found = np.fromstring(text, dtype=np.longdouble, sep=" ")
+            if found.size == len(ends) * count and np.isfinite(found).all():
+                return found.reshape(-1, count)
+    return None
+
+
+def _of_format(text: str, format: str) -> TextTable:
+    """A table without names, from its first row on."""
+    names = FORMATS[format].split(", ")
+    place = names.index("eccentricity") if "eccentricity" in names else names.index("k")
+
+    lines = text.replace("D", "E").replace(",", " ").splitlines()
+    for number, line in enumerate(lines):
+        cells = list(map(as_number, line.split()))
+        if len(cells) == len(names) and abs(cells[place]) < 1:
+            return TextTable(lambda: lines, names, "", number)
+    raise TableError(f'has no line of {len(names)} numbers, as format = "{format}" has: {FORMATS[format]}')
+
+
+def _factors(table: TextTable, format: str | None) -> dict[str, Any]:
+    """Exact factors to SI of the columns, by their names without units; columns to leave out are numbered."""
+    found: dict[str, Any] = {}
+    units = UNITS if format is None else {**UNITS, **dict.fromkeys(REGULAR, "1")}
+    for place, given in enumerate(table.names):
+        name, unit = name_and_unit(given)
+        if format is not None and given == _LEFT_OUT:
+            found[f"{_LEFT_OUT}{place}"] = parse_number(1)
+            continue
+        if name not in units:
+            raise TableError(f"line {table.head}: given the column {shown(name)}{nearest(name, UNITS)}; "
+                             f"allowed: {', '.join(UNITS)}")  # fmt: skip
+        if name in found:
+            raise TableError(f"line {table.head}: the column {name} is there twice; give each once")
+        try:
+            found[name] = parse_number(f"1 {unit}" if unit else 1, units[name])
+        except ValueError as error:
+            raise TableError(f"line {table.head}: column {name}: {error}") from None
+    if TIME not in found:
+        raise TableError(f"line {table.head}: has no column {TIME}; it is needed, such as time [yr]")
+    if len(found) < 2:
+        raise TableError(f"line {table.head}: has no column except {TIME}; at least one element is needed")
+    for one, other in (("periapsis", "longitude_of_periapsis"), ("mean_anomaly", "mean_longitude")):
+        if one in found and other in found:
+            raise TableError(f"line {table.head}: has both {one} and {other}; give one of them")
+    return found
+
+
+# --- orbits -------------------------------------------------------------------------------------------------
+
 
 _DOUBTFUL_TURN = 0.25  # of a turn, by which the mean longitude may be off what Kepler's law expects
 _LARGEST_TILT = 0.9999  # of sin(i/2): 178.4 deg

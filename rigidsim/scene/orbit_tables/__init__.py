@@ -1,1 +1,0 @@
-"""Orbits given by tables of elements, and the interpolation between their rows."""
