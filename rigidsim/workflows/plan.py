@@ -1,6 +1,4 @@
-"""``rigidsim plan``: what would be integrated and why, and what it will cost, from a short pilot; and ``rigidsim
-check``: whether a config could be run, and how it was understood.
-"""
+"""``rigidsim plan``: what would be integrated and why, and what it will cost, from a short pilot."""
 
 import math
 import time
@@ -17,19 +15,17 @@ from rigidsim.accuracy.choice import (
     Pilot,
     choose_level,
     chosen,
-    fully,
     growth_of,
     run_pilot,
 )
 from rigidsim.accuracy.estimates import closed_form_if_any, held_error, stable_law
 from rigidsim.accuracy.modelling import Unmeasured, measure_modelling
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.average import reads_rates_alone
 from rigidsim.model.equation_text import equation_texts
 from rigidsim.model.load import Load
 from rigidsim.scene.choices import FULL
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.sweep import Sweep
 from rigidsim.session.dataset import dataset_variables, refuse_taken_names, unused_variables
 from rigidsim.session.session import storage
 from rigidsim.session.understood import cautions_of, understood
@@ -39,10 +35,8 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.projection import LATE
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.store.segments import SegmentLimits
-from rigidsim.store.summary import SummaryPart, Understood, as_fields
-from rigidsim.workflows.read import Given, as_experiment, load
-from rigidsim.workflows.sweeps.members import recording
-from rigidsim.workflows.sweeps.plan import QUICK, check_sweep
+from rigidsim.store.summary import SummaryPart, Understood
+from rigidsim.workflows.read import Given, as_experiment
 
 _LEVEL_SECONDS = 0.2
 _LARGEST_CHUNK = 1024  # steps: at this length a call's overhead is negligible
@@ -395,38 +389,3 @@ def _seconds_per_sample(prepared: InitialValueProblem, parts: Assembly, row: flo
     parts.evaluator.evaluate(parts.evaluator.angles.apart(block))
     evaluation = (time.perf_counter() - started) / count
     return evaluation + row * _COMPRESSION + _BUFFERING
-
-
-# --- checks -------------------------------------------------------------------------------------------------
-
-
-class Checked(Understood):
-    """Result of a check: problems, warnings, and how a config that can be run was understood; ``as_dict``
-    gives what ``--json`` prints.
-    """
-
-    source: str
-    valid: bool
-    problems: list[Problem]
-
-
-def check(path: str | Path, *, overrides: Sequence[str] = ()) -> Checked:
-    """Validate a config as far as ``run`` would before its first step, and write nothing."""
-    try:
-        experiment = load(path, overrides=overrides)
-        if experiment.config.sweep is None:
-            prepared = prepare(fully(experiment))
-            refuse_taken_names(prepared)
-        else:
-            found = recording(Sweep.of(experiment))
-            prepared = check_sweep(found, most=QUICK)
-    except ConfigError as error:
-        unknown: dict[str, Any] = dict.fromkeys(("body", "start", "time"))
-        given = error.source or str(path)
-        return Checked(
-            source=given, valid=False, problems=error.problems, **as_fields([]), **unknown, loads=()
-        )
-    return Checked(
-        source=str(path), valid=True, problems=[], **as_fields(cautions_of(prepared.scene)),
-        **understood(prepared),
-    )  # fmt: skip

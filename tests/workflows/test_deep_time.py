@@ -11,7 +11,7 @@ from support import loaded, seeds
 import rigidsim
 from rigidsim.accuracy.reversal import there_and_back
 from rigidsim.formats.registry import Naming
-from rigidsim.workflows.plan import check
+from rigidsim.workflows.check import check
 
 YEAR = 365.25 * 86400
 ARCSEC = np.pi / 648000

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import rigidsim.workflows.check as validation
 import rigidsim.workflows.plan as planning
-import rigidsim.workflows.plan as validation
 import rigidsim.workflows.tradeoff as measuring
 from rigidsim.cli.exits import refuse_options
 from rigidsim.cli.screens.page import Page, Styled, answer, print_json, reporting
