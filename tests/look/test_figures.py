@@ -46,26 +46,6 @@ def earth(count: int = 1001, end: float = 1000 * DAY, tilt: float = 1e-6) -> xar
     )
 
 
-def satellite(count: int = 801) -> xarray.Dataset:
-    """A satellite that librates by a few degrees."""
-    time = np.linspace(0.0, DAY, count)
-    angles = np.deg2rad([3.0, 5.0, 1.0]) * np.sin(np.outer(time, [2.2e-3, 1.9e-3, 1.1e-3]) + np.arange(3))
-    nadir = np.stack([np.sin(angles[:, 1]), np.sin(angles[:, 0]), np.ones(count)], axis=1)
-    nadir /= -np.linalg.norm(nadir, axis=1, keepdims=True)
-    return xarray.Dataset(
-        {
-            "roll_pitch_yaw": (("time", "angle"), angles, {"units": "rad"}),
-            "libration": (("time", "libration_angle"), angles[:, [1, 0]] + [np.pi, 0], {"units": "rad"}),
-            "nadir": (("time", "body_axis"), nadir, {"units": "1"}),
-        },
-        coords={"time": ("time", time, {"units": "s"}), "angle": ["roll", "pitch", "yaw"]},
-        attrs={"title": "satellite", "config": '[[loads]]\nkind = "gravity_gradient"\n'},
-    )
-
-
-# what is drawn
-
-
 def test_polar_motion_of_the_earth_is_a_circle_with_its_period() -> None:
     page = figures.figure(earth())
     circle = next(axes for axes in page.axes if "m₁" in axes.get_xlabel())
@@ -80,31 +60,6 @@ def test_polar_motion_of_the_earth_is_a_circle_with_its_period() -> None:
     np.testing.assert_allclose(over_time.get_lines()[0].get_ydata(), rates[:, 0] / rates[:, 2] / ARCSEC)
     assert over_time.get_ylabel() == "polar motion [arcsec]"
     assert page.axes[1].get_xlabel() == "time [yr]"
-
-
-@pytest.mark.slow
-def test_libration_in_time_and_in_planes() -> None:
-    dataset = satellite()
-    page = figures.figure(dataset, "libration")
-    for line, name in zip(page.axes[1].get_lines(), ("roll", "pitch", "yaw"), strict=True):
-        assert line.get_label() == name
-        np.testing.assert_allclose(
-            line.get_ydata(), np.rad2deg(dataset["roll_pitch_yaw"].sel(angle=name).values)
-        )
-    inside, outside = page.axes[0].get_lines()
-    assert (inside.get_label(), outside.get_label()) == ("libration in plane − 180°", "out of plane")
-    np.testing.assert_allclose(
-        inside.get_ydata(), np.rad2deg(dataset["roll_pitch_yaw"].values[:, 1]), atol=1e-9
-    )
-    assert page.axes[2].get_xlabel() == "towards −x [deg]"
-    assert [x.replace("\n", " ") for x in titles(page)[2:]] == [
-        "The source seen from the body (+: −z axis)", "Phase planes",
-    ]  # fmt: skip
-    assert titles(figures.figure(dataset))[0].startswith("Libration")
-    # pitched by a right angle roll and yaw are undefined, and the source still where it is
-    steep = dataset[["nadir", "roll_pitch_yaw"]].assign_attrs(dataset.attrs)
-    steep["roll_pitch_yaw"] = steep["roll_pitch_yaw"] + np.array([0, np.pi / 2, 0])
-    assert titles(figures.figure(steep, "libration")) == ["The source seen from the body (+: −z axis)"]
 
 
 def test_polhode_lies_on_both_surfaces_and_the_separatrix_on_its_plane(symmetric_top: Build) -> None:
@@ -142,9 +97,3 @@ def test_drifts_stand_over_the_band_of_rounding(symmetric_top: Build) -> None:
     np.testing.assert_allclose(axes.get_lines()[0].get_ydata()[1:], 1e-16 * np.arange(1, 1001))
     assert axes.get_yscale() == "log"
     assert len(axes.collections) == 1
-
-
-# the page
-
-
-# units and numbers

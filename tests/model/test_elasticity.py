@@ -127,9 +127,6 @@ def test_a_synchronous_body_is_heated_on_an_eccentric_orbit() -> None:
     np.testing.assert_allclose(data["tidal_power"][:-1], power, rtol=0, atol=1e-4 * np.abs(power).max())
 
 
-# --- other sources, other carriers --------------------------------------------------------------------------
-
-
 # --- what is refused ----------------------------------------------------------------------------------------
 
 

@@ -142,14 +142,6 @@ def test_a_run_ends_where_moments_become_impossible(body: str, time: float, said
     assert_sound(run)
 
 
-def test_a_rate_that_turns_negative_ends_the_run() -> None:
-    load = 'kind = "mass_loss"\nrate = "1 - t/4"\nexit_point = [0, 0, 1]'
-    run = run_text(scene(10, "principal_moments = [10, 10, 5]", loads=load))
-    assert run.status == "stopped: impossible body"
-    assert "[[loads]] number 1 rate is negative" in run.summary["message"]
-    assert run.summary["time_reached"] == pytest.approx(4, abs=1e-3)  # 2^-16 of the rate at the start
-
-
 # --- what is refused ----------------------------------------------------------------------------------------
 
 VARYING = '"1 + 0.1*sin(t)"'

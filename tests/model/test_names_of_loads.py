@@ -1,12 +1,12 @@
-"""Names of loads in expressions, against Kepler's equation; shadows by quadrature of the covered chords."""
+"""Names of loads in expressions, against Kepler's equation."""
 
 from collections.abc import Callable
-from typing import Any
 
 import mpmath
 import numpy as np
 import pytest
 from equations import CLOSE, Random, derivative, matrix, prepared
+from kepler import on_ellipse, turned
 from support import config, run_text
 
 from rigidsim import ConfigError
@@ -14,7 +14,6 @@ from rigidsim import ConfigError
 BODY = "principal_moments = [0.03, 0.034, 0.01]"
 START = "angular_velocity = [0.5, -0.6, 0.7]\nquaternion = [1, 0.2, 0.1, -0.3]"
 MU = 3.986004418e14
-ELEMENTS = {"a": "7e6", "e": "0.02", "i": "0.9", "node": "0.3", "w": "0.5", "M": "0.7"}
 ORBIT = (
     f"gravitational_parameter = {MU:.10g}\norbit = {{semi_major_axis = 7e6, eccentricity = 0.02, "
     "inclination = 0.9, ascending_node = 0.3, periapsis = 0.5, mean_anomaly = 0.7}"
@@ -59,7 +58,8 @@ def test_names_are_what_the_body_sees(loaded: str, law: Callable[..., np.ndarray
     """Where the orbit begins, at ten attitudes and rates; the field of a dipole is Jackson's, eq. 5.56."""
     system = prepared(BODY, START, loads(EARTH, loaded), parameters='k = "500 A m^2 s/T"').system
     begun = np.ldexp([float(x) for x in system.initial], system.state_exponents)
-    source = np.array([float(x) for x in _mp_place(0, ELEMENTS, mpmath.mpf("3.986004418e14"))])
+    place = turned(mpmath.mp, on_ellipse(mpmath.mp, 7e6, 0.02, 0.7), (0.5, 3), (0.9, 1), (0.3, 3))
+    source = np.array([float(x) for x in place])
     far, random, moments = np.linalg.norm(source), Random(3), np.array([0.03, 0.034, 0.01])
     field = 1e-7 / far**3 * (3 * (DIPOLE @ source) * source / far**2 - DIPOLE)
     for _ in range(10):
@@ -69,22 +69,6 @@ def test_names_are_what_the_body_sees(loaded: str, law: Callable[..., np.ndarray
         expected = (turning - np.cross(w, moments * w)) / moments
         found = derivative(system, np.concatenate([w, q, begun[7:]]))[:3]
         np.testing.assert_allclose(found, expected, rtol=0, atol=10 * CLOSE)
-
-
-def _mp_place(t: float, of: dict[str, str], strength: Any) -> list[Any]:
-    mp = mpmath.mpf
-    a, e, i, node, w, mean = (mp(of[x]) for x in ("a", "e", "i", "node", "w", "M"))
-    mean += mpmath.sqrt(strength / a**3) * mp(t)
-    anomaly = mean
-    for _ in range(8):
-        anomaly -= (anomaly - e * mpmath.sin(anomaly) - mean) / (1 - e * mpmath.cos(anomaly))
-    v = 2 * mpmath.atan(mpmath.sqrt((1 + e) / (1 - e)) * mpmath.tan(anomaly / 2))
-    r, u = a * (1 - e * mpmath.cos(anomaly)), v + w
-    return [
-        r * (mpmath.cos(node) * mpmath.cos(u) - mpmath.sin(node) * mpmath.sin(u) * mpmath.cos(i)),
-        r * (mpmath.sin(node) * mpmath.cos(u) + mpmath.cos(node) * mpmath.sin(u) * mpmath.cos(i)),
-        r * mpmath.sin(u) * mpmath.sin(i),
-    ]
 
 
 # --- what is refused ----------------------------------------------------------------------------------------

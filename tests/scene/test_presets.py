@@ -215,28 +215,6 @@ def test_the_space_station_is_the_published_tensor() -> None:
     )
 
 
-def test_a_cubesat_is_the_sum_of_its_parts() -> None:
-    """Point masses on a fine grid in each of five boxes."""
-    boxes = [(3.6, (0.1, 0.1, 0.3405), (0.0, 0.0, 0.0))]
-    for x, y in ((0.2, 0), (-0.2, 0), (0, 0.2), (0, -0.2)):
-        boxes.append((0.1, (0.3, 0.1, 0.002) if x else (0.1, 0.3, 0.002), (x, y, -0.17025)))
-    nodes, weights = np.polynomial.legendre.leggauss(2)  # exact for squares
-    points = []
-    for mass, size, centre in boxes:
-        for i, j, k in np.ndindex(2, 2, 2):
-            place = [c + s / 2 * nodes[n] for c, s, n in zip(centre, size, (i, j, k), strict=True)]
-            points.append((mass * weights[i] * weights[j] * weights[k] / 8, np.array(place)))
-    total = sum(m for m, _ in points)
-    centre = sum(m * r for m, r in points) / total
-    tensor = sum(
-        m * ((r - centre) @ (r - centre) * np.eye(3) - np.outer(r - centre, r - centre)) for m, r in points
-    )
-    found = body("cubesat_3u")
-    assert float(found.mass) == pytest.approx(total, rel=1e-15)
-    assert np.diag(tensor) == pytest.approx([float(m) for m in found.principal_moments], rel=1e-13)
-    assert len(found.drawing) == 5
-
-
 def test_a_whole_presets_keys_are_overridden_one_by_one() -> None:
     def field(more: str = "") -> Any:
         return body_of(f'preset = "earth_rigid"\n{more}').gravity

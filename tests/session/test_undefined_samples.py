@@ -37,6 +37,8 @@ def test_a_variable_lost_on_the_way_is_warned_of(flipping: rigidsim.Run) -> None
     outside = np.hypot(rates[:, 0], rates[:, 2]) > np.abs(rates[:, 1])
     assert 0 < outside.sum() < len(outside)  # the definition, not what was recorded
     np.testing.assert_array_equal(undefined(flipping, "polar_motion"), outside)
+    pole = (rates[:, [2, 0]] / rates[:, [1]])[~outside]
+    np.testing.assert_allclose(flipping.dataset.polar_motion.values[~outside], pole, rtol=1e-14)
     assert flipping.summary["undefined_samples"] == {"polar_motion": int(outside.sum())}
     assert flipping.summary["warning_codes"] == ["undefined"]
     (told,) = flipping.summary["warnings"]

@@ -79,20 +79,6 @@ def as_by_an_earlier_version(checkpoint: Path) -> None:
     seal.seal(checkpoint)
 
 
-@pytest.mark.slow
-@pytest.mark.unoptimised
-def test_samples_move_no_bit_across_the_count() -> None:
-    """Whichever way steps are taken: skipped, in grids, in blocks, or one by one."""
-    end = 4 * round(1.5 * LATE * STEP / 4)
-    dense = run_text(text(end, '"auto"', samples=8 * end + 1)).dataset
-    sparse = run_text(text(end, '"auto"', samples=3)).dataset
-    middling = run_text(text(end, '"auto"', samples=end // 4 + 1)).dataset
-    assert np.array_equal(bits(dense.quaternion[-1].values), bits(sparse.quaternion[-1].values))
-    common, here, there = np.intersect1d(dense.time.values, middling.time.values, return_indices=True)
-    assert len(common) > 400
-    assert np.array_equal(bits(dense.quaternion.values[here]), bits(middling.quaternion.values[there]))
-
-
 class WrongPotential(Load):
     """A torque that turns the body's z axis towards the space axis X, and a potential that belongs to a
     somewhat larger one.

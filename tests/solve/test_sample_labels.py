@@ -1,18 +1,14 @@
 """A sample's label is the number that the config means, rounded once, and its time of integration is too."""
 
-import math
 import random
 from fractions import Fraction
 from typing import Any
 
-import mpmath
 import numpy as np
 import pytest
-import xarray
-from support import cases, config, run_text
+from support import run_text
 
 import rigidsim
-from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.solve.problem import prepare
 
 SPIN = """
@@ -102,50 +98,3 @@ def test_the_motion_begins_at_start_and_not_at_the_first_sample(integrator: str)
     before = run_text(text.format("start = -12.5\ntimes = [0, 12.5]"), 'name="c"').dataset
     # the same motion on a clock that is 12.5 s behind: times are exact in both
     assert np.abs(before["quaternion"].values - grid["quaternion"].values[1:]).max() < 1e-14
-
-
-# ---- digits: what a precision promises is what the dataset holds
-
-TOP = config("principal_moments = [2, 2, 3]", "angular_velocity = [0.1, 0, 0.7]", (), "end = 20\nsamples = 5")
-
-
-def exact_rates(digits: int, times: list) -> list[list]:
-    """Rates of the free symmetric top: w1 = 0.1 cos(0.35 t), w2 = 0.1 sin(0.35 t), exactly."""
-    with mpmath.workdps(digits + 20):
-        rate = mpmath.mpf(7) / 20
-        return [[mpmath.cos(rate * t) / 10, mpmath.sin(rate * t) / 10, mpmath.mpf(7) / 10] for t in times]
-
-
-def summed(dataset: xarray.Dataset, name: str) -> list[list]:
-    """All parts of a variable, smallest first, as mpf."""
-    parts = [dataset[part].values for part in parts_in(dataset, name)]
-    rows = []
-    with mpmath.workprec(4000):
-        for i in range(parts[0].shape[0]):
-            rows.append(
-                [sum(mpmath.mpf(float(p[i, k])) for p in reversed(parts)) for k in range(parts[0].shape[1])]
-            )
-    return rows
-
-
-@pytest.mark.parametrize(
-    "case",
-    cases(
-        [("double", 16, 53), ("extended", 19, 64), ("quadruple", 34, 113), (25, 25, 86), (50, 50, 169)],
-        [("double", 16, 53), ("extended", 19, 64), (50, 50, 169)],
-    ),
-)
-def test_rates_have_the_digits_of_the_precision(case: tuple[str | int, int, int]) -> None:
-    """0.1 and 0.7 are no binary numbers: a double anywhere on the way would cost all digits past 16."""
-    precision, digits, bits = case
-    setting = precision if isinstance(precision, int) else f'"{precision}"'
-    run = run_text(TOP, f"integrator.precision={setting}")
-    exact = exact_rates(digits, [0, 5, 10, 15, 20])
-    with mpmath.workprec(4000):
-        error = max(
-            abs(a - b) for x, y in zip(summed(run.dataset, "angular_velocity"), exact, strict=True)
-            for a, b in zip(x, y, strict=True)
-        )  # fmt: skip
-        steps = run.summary["cost"]["steps"]
-        # the rounding of amplitude 0.1 at each step, as a random walk, three standard deviations
-        assert error <= 3 * 0.1 * mpmath.mpf(2) ** (1 - bits) * math.sqrt(steps)
