@@ -181,9 +181,11 @@ def judge_reversal(scene: CoverageScene) -> Judged:
     """Integrate a shortened scene to its end and back; scenes take turns in direction and precision."""
     turn = "60" if scene.number % 60 == 59 else f'"{_TURNS[scene.number // 2 % len(_TURNS)]}"'
     setting = [] if "precision = " in scene.text else [f"integrator.precision={turn}"]
-    end = float(scene.text.split("[time]\nend = ")[1].split("\n")[0]) * min(1.0, _SHORT / scene.radians)
+    end = float(scene.text.split("[time]\nend = ")[1].split("\n")[0])
+    if scene.family != DEEP_TIME:  # whose table has rows on one side
+        end *= min(1.0, _SHORT / scene.radians) * (-1) ** scene.number
     asked = [*setting, f"limits.max_steps={MOST_STEPS // 5}"]
-    asked += [f"time.end={-end if scene.number % 2 else end!r}", "time.samples=2"]
+    asked += [f"time.end={end!r}", "time.samples=2"]
     begin = Judged(scene.number, scene.family, " ".join(setting), "refused", scene.radians)
     try:
         found = there_and_back(rigidsim.parse(scene.text, overrides=asked), compact=True)

@@ -121,9 +121,9 @@ def table(draw: Draw) -> None:
 
 
 def write_table(draw: Draw, end: float) -> None:
-    """Elements that oscillate, with 8 to 60 rows."""
+    """Elements that oscillate, with 8 to 60 rows until the end, and as many before the start."""
     rows = int(draw.random.integers(8, 61))
-    times = np.linspace(0, end, rows)
+    times = np.linspace(-end, end, 2 * rows - 1)
     axis = next(float(line.split(" = ")[1]) for line in draw.parameters if line.startswith("far = "))
     (strength,) = (float(x.split(" = ")[1]) for x in draw.more if x.startswith("gravitational_parameter"))
     slow = draw.between(0.5, 2) / end
@@ -132,7 +132,7 @@ def write_table(draw: Draw, end: float) -> None:
     eccentricity = draw.between(0.02, 0.3) * (1 + 0.2 * sway)
     inclination = draw.between(0.1, 1) * (1 + 0.1 * np.cos(slow * times))
     head = "time, semi_major_axis, eccentricity, inclination, ascending_node, periapsis"
-    columns = [times, np.full(rows, axis), eccentricity, inclination, turned, -turned / 2]
+    columns = [times, np.full(len(times), axis), eccentricity, inclination, turned, -turned / 2]
     if end / rows * math.sqrt(strength / axis**3) < 0.5:  # so often that the anomaly can be told, too
         head += ", mean_anomaly"
         columns.append(math.sqrt(strength / axis**3) * times - turned / 2)

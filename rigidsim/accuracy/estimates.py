@@ -708,10 +708,15 @@ class MemberEstimates:
         loose = float(self._prepared.effective_tolerance)
         self._by_chance = loose <= _BY_CHANCE * self._epsilon  # whether errors come mainly from rounding
         rights = family.as_parameters([right for _, right in family.system.equations[: family.moving]])
-        equations = zip(family.system.variables, timed(rights, len(family.in_equations)), strict=False)
-        tolerance = _TOLERANCE if self._by_chance else loose * _BETTER
-        compact = family.system.wide
-        self._engine = BatchEngine(list(equations), max(width, _LANES), tolerance=tolerance, compact=compact)
+        knots = family.knots
+        first = len(family.in_equations) + (0 if knots is None else knots.parameters)
+        self._engine = BatchEngine(
+            list(zip(family.system.variables, timed(rights, first), strict=False)),
+            max(width, _LANES),
+            tolerance=_TOLERANCE if self._by_chance else loose * _BETTER,
+            compact=family.system.wide,
+            knots=None if self._by_chance else knots,
+        )
 
     def of(self, block: BatchBlock) -> MemberErrors:
         """Errors of a block's members."""
@@ -785,8 +790,9 @@ class MemberEstimates:
         return spread
 
     def _followed(self, block: BatchBlock, some: np.ndarray, starts: Starts) -> Spread:
-        epsilon, read = self._epsilon, starts.parameters[self._family.in_equations]
-        carrier = LaneCarrier(self._engine, read, starts)
+        epsilon, read, knots = self._epsilon, starts.parameters[self._family.in_equations], self._family.knots
+        read = np.concatenate([np.zeros((0 if knots is None else knots.parameters, len(some))), read])
+        carrier = LaneCarrier(self._engine, read, starts, knots)
         loose = max(self._prepared.effective_tolerance / epsilon, 1.0)
         errors = plain_perturbations(self._prepared.system, loose)
         rows = np.unique(np.linspace(0, len(block.moments) - 1, _BEGUN_ANEW + 2).astype(int)[1:-1])

@@ -27,7 +27,7 @@ from rigidsim.model.state_blocks import BODY
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import compiled_function, evaluate_rows
 from rigidsim.solve.lanes import BatchEngine
-from rigidsim.solve.requirements import requirement_of
+from rigidsim.solve.requirements import SetAtKnots, requirement_of
 from rigidsim.solve.stepper import Mark
 from rigidsim.solve.tangents import parameters_of
 from rigidsim.solve.taylor_stepper import TaylorStepper
@@ -84,20 +84,26 @@ class LaneCarrier:
         engine: of the equations with an error of the time as their last parameter.
         read: the other parameters, (parameters, motions).
         starts: of the motions, whose series bound their steps.
-        system: with pieces that are followed, of a single motion in place of them.
+        knots: of pieces that are followed. first: index of their first parameter.
     """
 
     shortest = SHORTEST
 
     def __init__(
-        self, engine: BatchEngine, read: np.ndarray, starts: Starts | None, system: System | None = None
+        self,
+        engine: BatchEngine,
+        read: np.ndarray,
+        starts: Starts | None,
+        knots: SetAtKnots | None = None,
+        first: int = 0,
     ) -> None:
         self._engine, self._longest = engine, np.full(1, math.inf)
         self._read = np.concatenate([read, np.zeros((1, read.shape[1]))])
+        self._knots, self._first = knots, first
         if starts is not None:
+            for place, time in enumerate(starts.begin.tolist()):
+                self._enter(starts.states, self._read, slice(place, place + 1), time)
             self._longest = engine.longest(starts.states, self._read, starts.begin)
-        self._pieces = None if system is None else system.pieces
-        self._places = {name: place for place, name in enumerate([] if system is None else system.states)}
 
     @classmethod
     def of(cls, system: System, tolerance: float, *, compact: bool) -> LaneCarrier:
@@ -114,7 +120,8 @@ class LaneCarrier:
             optimised=False,
             requirement=requirement_of(system) if system.pieces is None else None,
         )
-        return cls(engine, np.zeros((first, 1)), None, system)
+        knots = None if system.pieces is None else SetAtKnots(system)
+        return cls(engine, np.zeros((first, 1)), None, knots, system.first_of_pieces)
 
     def advance(
         self,
@@ -159,24 +166,32 @@ class LaneCarrier:
     def _onward(
         self, most: int, there: np.ndarray, read: np.ndarray, now: np.ndarray, ends: np.ndarray, *more: Any
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Go on, through pieces of the equations."""
-        if self._pieces is None:
+        """Go on, through pieces of the equations, each motion with its neighbours in one."""
+        if self._knots is None:
             return self._engine.onward(most, there, read, now, ends, *more)
-        number, taken = self._pieces.number_at(float(now[0])), np.zeros(len(now))
-        while True:
-            knots = self._pieces.knots
-            if number and float(knots[number - 1]) == now[0]:
-                for name, value in self._pieces.states(number).items():
-                    there[self._places[name]] = value
-            edge = float(knots[number]) if number < len(knots) else math.inf
-            values = np.array(self._pieces.parameters(number), dtype=float)
-            read[-1 - len(values) : -1] = values[:, None]
-            there, now, gone = self._engine.onward(
-                most - int(taken[0]), there, read, now, np.minimum(ends, edge), *more
-            )
-            taken, number = taken + gone, number + 1
-            if (now < edge).any() or edge >= ends[0] or taken[0] >= most:
-                return there, now, taken
+        lanes, taken = 1 + TANGENTS, np.zeros(len(now))
+        going = np.arange(0, len(now), lanes)
+        while len(going):
+            edges = np.array([self._enter(there, read, slice(k, k + lanes), float(now[k])) for k in going])
+            some = (going[:, None] + np.arange(lanes)).ravel()
+            left, until = most - int(taken[going].min()), np.minimum(ends[some], np.repeat(edges, lanes))
+            given = there[:, some], read[:, some], now[some], until, *(x[some] for x in more)
+            there[:, some], now[some], gone = self._engine.onward(left, *given)
+            taken[some] += gone
+            late = (now[some].reshape(-1, lanes) < edges[:, None]).any(axis=1)
+            going = going[~(late | (edges >= ends[going]) | (taken[going] >= most))]
+        return there, now, taken
+
+    def _enter(self, states: np.ndarray, read: np.ndarray, lanes: slice, time: float) -> float:
+        """Set what begins at a time, or contains it, in some lanes; returns where it ends."""
+        if (knots := self._knots) is None:
+            return math.inf
+        number = knots.pieces.number_at(time)
+        if number and knots.pieces.knots[number - 1] == time:
+            for series, values in knots.pieces.changes(number):
+                states[knots.places[series], lanes] = values[:, None]
+        read[self._first : self._first + knots.parameters, lanes] = knots.pieces.parameters(number)[:, None]
+        return float(knots.pieces.knots[number]) if number < len(knots.pieces.knots) else math.inf
 
 
 class SteppedCarrier:

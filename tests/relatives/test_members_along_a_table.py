@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from support import config, seeds
+from support import config, first_seed, seeds
 
 import rigidsim
 
@@ -58,6 +58,8 @@ def test_members_in_lanes_follow_the_equations(seed: int, tmp_path: Path) -> Non
     )
     table = "\n".join(", ".join(f"{x:.16g}" for x in cells) for cells in (rows[::way]).tolist())
     every, count = years[-5] / 20 * draw.uniform(0.9, 1), draw.randint(3, 6)
+    # the Moon's place isn't known: no model is measured, which would take seconds for each member
+    announced, tight = tidal and seed > first_seed(), draw.random() < 0.5
     suns, tilts, tides = (
         [draw.uniform(*ends) for _ in range(count)] for ends in ((0.9 * SUN, 1.1 * SUN), (0.3, 1.2), (0, 2))
     )
@@ -84,6 +86,8 @@ def test_members_in_lanes_follow_the_equations(seed: int, tmp_path: Path) -> Non
         more=more
         + "[tables.\"orbit.csv\"]\ntext = '''\ntime [yr], eccentricity, inclination, ascending_node, "
         f"longitude_of_periapsis\n{table}\n'''\n",
+        integrator="tolerance = 1e-16" if announced and tight else "",
+        estimate=announced,
         name="members",
     )
     found = rigidsim.sweep(rigidsim.parse(text), out=tmp_path / "lanes")
@@ -103,7 +107,11 @@ def test_members_in_lanes_follow_the_equations(seed: int, tmp_path: Path) -> Non
         assert np.abs(axes - known).max() < missed + 1e-10
         assert np.abs(axes - alone.momentum_axis.values[member]).max() < 1e-13
         assert np.abs(seen.precession.values[member] - alone.precession.values[member]).max() < 1e-12
+    if announced:
+        ratios = seen.attitude_error.values / alone.attitude_error.values
+        assert ((ratios > 0.1) & (ratios < 10)).all()
+        np.testing.assert_array_equal(seen.warnings.values, alone.warnings.values)
     rigidsim.sweep(rigidsim.parse(text), out=tmp_path / "parts", tiles=(1, 2))
     again = rigidsim.sweep(rigidsim.parse(text), out=tmp_path / "parts").dataset.load()
-    for name in ("momentum_axis", "precession", "steps"):
+    for name in ("momentum_axis", "precession", "steps", "attitude_error"):
         np.testing.assert_array_equal(seen[name].values, again[name].values)

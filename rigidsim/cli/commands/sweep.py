@@ -167,7 +167,6 @@ _CURES = {
     "accuracy": "give a tolerance in place of accuracy, and they run in batches",
     "chart": 'formulation = "quaternion" runs in batches',
     "angles": "record quaternion in place of those angles, and they run in batches",
-    "averaged": "[output] estimate = false leaves it out, and they run in batches",
     "key": "members that differ in a number of the body, the start or a load run in batches",
     "families": "sweep a number of the body, the start or a load, or take more members of each kind",
 }

@@ -81,7 +81,6 @@ NotBatchable = Enum(
         "KEY": "what is swept is not a number of the body, the start, a load, a rotor or a parameter",
         "UNTRACEABLE": "the equations depend on what is swept in a way that can't be determined beforehand",
         "FAMILIES": "too few members share a system of equations",
-        "AVERAGED": "the error of an averaged model is measured run by run",
         "RANGE": "a coefficient is outside the range of double precision",
     },
 )
@@ -101,7 +100,6 @@ def batchable(experiment: Experiment, keys: Sequence[str]) -> NotBatchable | Non
         NotBatchable.METHOD: integrator.method != DEFAULT_METHOD,
         NotBatchable.HELD: integrator.hold_invariants is True,
         NotBatchable.CHART: not variables_named(integrator.formulation).regular,
-        NotBatchable.AVERAGED: config.model.level != FULL and config.output.estimate,
         NotBatchable.ORIENTATION: config.output.orientation is not None,
         NotBatchable.LYAPUNOV: config.output.lyapunov,
         NotBatchable.KEY: any(Path.of(key).steps[0] not in _SWEPT_TABLES for key in keys),

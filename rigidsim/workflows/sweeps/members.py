@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.accuracy.estimates import MemberErrors, MemberEstimates
-from rigidsim.accuracy.modelling import modelling_of
+from rigidsim.accuracy.estimates import UNCERTAIN, MemberErrors, MemberEstimates
+from rigidsim.accuracy.modelling import ENERGY, SIZE, Unmeasured, measure_modelling
 from rigidsim.errors import ConfigError, MemberError, Problem, RigidsimError
 from rigidsim.model.tangents import GROWTH
 from rigidsim.scene.cautions import WarningCode
@@ -36,9 +36,11 @@ from rigidsim.solve.batch.family import (
     Sorted,
     batchable,
 )
+from rigidsim.solve.effects.waypoints import SampleTrail
 from rigidsim.solve.indicators import indicators
 from rigidsim.solve.lanes import LANES_OF_A_TABLE
 from rigidsim.solve.problem import prepare
+from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.status import Status
 from rigidsim.store.netcdf import joined_parts
 from rigidsim.store.run import MemoryRun
@@ -343,19 +345,19 @@ def plain_variables(
     return found
 
 
-def _modelling_errors(found: Modelling, members: int = 1) -> Kept:
-    """Errors of an averaged model, the same for so many members."""
+def _modelling_errors(found: Sequence[Modelling | None]) -> Kept:
+    """Errors of members' averaged models; None where none was measured."""
     errors = {
-        "modelling_error": (found.worst, "directions", "rad"),
-        "modelling_error_norm": (found.angular_momentum_norm, "angular_momentum_norm, relative", "1"),
-        "modelling_error_energy": (found.energy, "energy of rotation, relative", "1"),
+        "modelling_error": ("worst", "directions", "rad"),
+        "modelling_error_norm": (SIZE, "angular_momentum_norm, relative", "1"),
+        "modelling_error_energy": (ENERGY, "energy of rotation, relative", "1"),
     }
-    until = "largest error of the averaged model's {} until the end"
-    return {
-        name: kept(np.full(members, error, dtype=float), units, until.format(what))
-        for name, (error, what, units) in errors.items()
-        if error is not None or name == "modelling_error"
-    }
+    until, every = "largest error of the averaged model's {} until the end", Kept()
+    for name, (attribute, what, units) in errors.items():
+        column = np.array([getattr(one, attribute, None) for one in found], dtype=float)
+        if name == "modelling_error" or not np.isnan(column).all():
+            every[name] = kept(column, units, until.format(what))
+    return every
 
 
 @contextmanager
@@ -391,7 +393,7 @@ def run_alone(sweep: Sweep, member: int, keep: Sequence[str]) -> MemberResults:
         position_error=None if placed is None else [placed],
     )
     if summary.modelling is not None:
-        results |= _modelling_errors(summary.modelling)
+        results |= _modelling_errors([summary.modelling])
     if "frequencies" in keep and result.blocks:
         results |= frequencies_of(result)
     reasons = {} if summary.status in ENDED_WELL else {0: summary.message}
@@ -432,7 +434,6 @@ _ONE_BY_ONE = ("frequencies",)
 _LOOKED_AT, _COUNTED = 64, 4096  # members by which a sweep is judged, by their equations and by their kinds
 _MOST_KINDS, _LEAST_MEMBERS = 64, 8
 """Up to so many kinds of members have batches however few members they have; more need so many each."""
-_NOT_ASKED = UnmeasuredCode.NOT_ASKED.value
 _MOST_AHEAD = 4  # families compiled before the first tile
 
 
@@ -534,14 +535,14 @@ class BatchTiles:
             estimates = MemberEstimates(family, batch.width) if self._estimated else None
             variables = [v for v in dataset_variables(family.prepared) if "units" in v.attributes]
             averaged = family.prepared.system.formulation.average is not None
-            modelling = modelling_of(family.prepared, how="", unmeasured=_NOT_ASKED) if averaged else None
             for block in batch.blocks():
                 before = time.process_time()
                 errors = estimates.of(block) if estimates is not None else None
+                models = self._models(block, [members[k] for k in block.members]) if averaged else []
                 spent = time.process_time() - before
                 done = np.array([status is not None for status in block.status], dtype=bool)
                 if done.any():
-                    results = self._results(variables, block, errors, modelling, done, keep, spent)
+                    results = self._results(variables, block, errors, models, done, keep, spent)
                     parts.append((block.members[done], results))
                 if not done.all():
                     left += block.members[~done].tolist()
@@ -560,9 +561,30 @@ class BatchTiles:
     def _estimated(self) -> bool:
         return self._sweep.base.config.output.estimate
 
+    def _models(self, block: BatchBlock, members: Sequence[int]) -> list[Modelling | Unmeasured | None]:
+        """Errors of members' averaged models, measured from their samples as in single runs; None where they
+        aren't asked for, or a member didn't finish.
+        """
+        found = list[Modelling | Unmeasured | None]()
+        for place, (member, status) in enumerate(zip(members, block.status, strict=True)):
+            if not self._estimated or status is not Status.FINISHED:
+                found.append(None)
+                continue
+            prepared = prepare(self._sweep.worked_out(member))
+            trail = SampleTrail(prepared.precision)
+            trail.take(SampleBlock.of(0, block.moments[:, place], block.states[:, :, place]))
+            try:
+                found.append(measure_modelling(prepared, trail).modelling)
+            except Unmeasured as why:
+                if why.code is UnmeasuredCode.INTERRUPTED:
+                    raise KeyboardInterrupt from None
+                found.append(why)
+        return found
+
     def _results(
         self, variables: Sequence[Variable], block: BatchBlock, errors: MemberErrors | None,
-        modelling: Modelling | None, done: np.ndarray, keep: Sequence[str], estimating: float,
+        models: Sequence[Modelling | Unmeasured | None], done: np.ndarray, keep: Sequence[str],
+        estimating: float,
     ) -> MemberResults:  # fmt: skip
         """Results of those members of a block that are ``done``."""
         sweep = self._sweep
@@ -572,6 +594,12 @@ class BatchTiles:
         if errors is not None:
             gone = WarningCode.RATES_UNCERTAIN if errors.attitude is None else WarningCode.ATTITUDE_UNCERTAIN
             warned[gone] = errors.uncertain
+        known = [one if isinstance(one, Modelling) else None for one in models]
+        if models:
+            sizes = [(one.worst, one.angular_momentum_norm, one.energy) if one else () for one in known]
+            wrong = [max((x or 0.0 for x in size), default=0.0) > UNCERTAIN for size in sizes]
+            warned[WarningCode.MODEL_UNCERTAIN] = np.array(wrong)
+            warned[WarningCode.MODEL_UNMEASURED] = np.array([isinstance(x, Unmeasured) for x in models])
         bits = [np.where(found, warning_bits([code.value]), 0) for code, found in warned.items()]
         rows = np.maximum(block.reached - 1, 0)
         kept |= plain_variables(
@@ -583,8 +611,8 @@ class BatchTiles:
             attitude_error=None if errors is None else errors.attitude,
             position_error=None if errors is None else errors.position,
         )
-        if modelling is not None:
-            kept |= _modelling_errors(modelling, len(done))
+        if models:
+            kept |= _modelling_errors(known)
         kept = {name: replace(v, values=v.values[done]) for name, v in kept.items()}
         statuses = [status for status in block.status if status is not None]
         reasons = {i: one.message for i, one in enumerate(statuses) if one.value not in ENDED_WELL}
