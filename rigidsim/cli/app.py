@@ -565,12 +565,15 @@ def orbits(
     ] = "de421",
     out: Annotated[Path, options.option("--out", "DIR", "Folder of the tables, PLANET.csv each.")] = Path(),
     force: Annotated[bool, options.replacing("Replace tables of these names.")] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue interrupted tables, with the same bits.")
+    ] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Integrate the planets from J2000 (needs rigidsim[orbits]), and write tables of their averaged elements,
     which orbit = {table = "PLANET.csv"} reads.
 
-    A million years take some four minutes. Ctrl-C keeps finished rows.
+    A million years take some four minutes. Ctrl-C keeps finished rows; --resume continues.
 
     Example: rigidsim orbits earth --end "-10 kyr" --every "400 yr"
     """

@@ -11,24 +11,33 @@ order 11: the map of Wisdom & Holman (1991, AJ 102, 1528).
 from __future__ import annotations
 
 import ctypes
+import fcntl
+import hashlib
+import json
 import math
+import os
 import time
+import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from tempfile import NamedTemporaryFile
+from typing import Any, TextIO
+from zipfile import BadZipFile
 
 import mpmath
 import numpy as np
 
-from rigidsim.errors import RigidsimError
+from rigidsim.errors import FORCE, OUT, Remedy, RigidsimError, RunFolderError, once_mended
 from rigidsim.scene.exact import parse_number
 from rigidsim.scene.kernels.reading import KernelError, kernel_of
 from rigidsim.scene.space_axes import obliquity, to_ecliptic
 from rigidsim.scene.validation_messages import nearest, shown
 from rigidsim.session.progress import left_text, meter
+from rigidsim.store import atomic
 from rigidsim.store.outputs import refuse_loss
 
 PLANETS = ("mercury", "venus", "earth", "mars", "jupiter", "saturn", "uranus", "neptune")
@@ -39,6 +48,9 @@ CHAOTIC = 50e6
 """
 BEYOND = 3
 """Rows beyond both ends, with which a table is interpolated there as elsewhere."""
+RESUMED = Remedy("--resume", "resume=True")
+SAVED_EVERY = 10.0
+"""Seconds between states that are saved."""
 _EARTH = 1 + PLANETS.index("earth")
 _AU, _LIGHT = 149597870.7, 299792.458  # km, km/s
 _DAY, _YEAR = 86400, 31557600  # s
@@ -110,8 +122,10 @@ def write_orbits(
     kernel: str = "de421",
     out: str | Path = ".",
     force: bool = False,
+    resume: bool = False,
 ) -> Orbits:
-    """Integrate the planets from J2000 to ``end``, and write ``PLANET.csv`` of those named, row by row.
+    """Integrate the planets from J2000 to ``end``, and write ``PLANET.csv`` of those named, row by row. Until
+    they are complete, ``PLANET.unfinished`` holds a state from which they are continued with the same bits.
 
     Args:
         planets: names from ``PLANETS``; all eight are integrated.
@@ -119,12 +133,13 @@ def write_orbits(
             osculating elements. All in s, or with a unit ("-1 Myr").
         kernel: an installed package of an ephemeris, as ``[ephemeris] kernel``.
         out: folder of the tables. force: whether they may replace files.
+        resume: whether tables that were interrupted are continued; others begin.
 
     Returns:
         What was written, also after Ctrl-C.
 
     Raises:
-        RigidsimError: an argument isn't allowed, or REBOUND is missing.
+        RigidsimError: an argument isn't allowed, REBOUND is missing, or files can't be written.
     """
     for name in planets:
         if name not in PLANETS:
@@ -140,32 +155,62 @@ def write_orbits(
     start = _start(kernel)
     names = list(dict.fromkeys(planets))
     files = [Path(out) / f"{name}.csv" for name in names]
-    refuse_loss(files, [], force=force)
-    begin, rows, reached, axes, complete = time.perf_counter(), 0, 0.0, np.zeros(len(names)), True
+    unfinished = _Unfinished(
+        files[0].with_suffix(".unfinished"),
+        {
+            "planets": names,
+            **{"end": str(end), "every": str(every), "window": str(window), "kernel": kernel},
+            "state of the kernel at J2000": hashlib.sha256(start.tobytes()).hexdigest(),
+            **{name: version(name) for name in ("rebound", "numba")},
+        },
+    )
+    averages = _Averages(start, rhythm, [1 + PLANETS.index(name) for name in names])
+    if resume and unfinished.path.exists():
+        done = unfinished.restored(averages, files)
+    else:
+        if unfinished.path.exists() and not force:
+            what = (
+                f"tables that were interrupted can be continued from it: {RESUMED} does, {FORCE} begins again"
+            )
+            raise RunFolderError(f"{unfinished.path}: {what}")
+        refuse_loss(files, [], force=force)
+        done = _Done([0] * len(names), 0, 0.0, np.zeros(len(names)))
+    begin = saved = time.perf_counter()
+    first, complete = averages.share, True
     with ExitStack() as stack:
+        stack.enter_context(_writing(files[0]))
+        opened = [stack.enter_context(file.open("a", encoding="utf-8", newline="\n")) for file in files]
+        unfinished.save(averages, done)
+        for name, file, size in zip(names, opened, done.sizes, strict=True):
+            file.truncate(size)
+            if not size:
+                file.write(_HEAD.format(planet=name.title(), end=end, window=window, kernel=kernel))
         show = stack.enter_context(meter())
         show.name = "orbits"
         show.phase(f"integrating the planets to {end}")
-        opened = [stack.enter_context(file.open("w", encoding="utf-8", newline="\n")) for file in files]
-        for name, file in zip(names, opened, strict=True):
-            file.write(_HEAD.format(planet=name.title(), end=end, window=window, kernel=kernel))
         try:
-            for row, means in _averages(start, rhythm, [1 + PLANETS.index(name) for name in names]):
+            for row, means in averages:
                 for file, (k, h, ix, iy, _) in zip(opened, means, strict=True):
                     angles = 2 * math.asin(math.hypot(ix, iy) / 2), math.atan2(iy, ix), math.atan2(h, k)
                     degrees = ", ".join(f"{math.degrees(x):.10f}" for x in angles)
                     file.write(f"{rhythm.year(row):.12g}, {math.hypot(k, h):.12f}, {degrees}\n")
                     file.flush()
-                rows, axes, reached = rows + 1, axes + means[:, 4], rhythm.year(row)
-                share = (row + BEYOND) / (rhythm.rows + 2 * BEYOND)
-                left = left_text(time.perf_counter() - begin, share)
-                show.update(share, f"{100 * share:.1f} %, t = {reached / 1000:,.6g} kyr, {left}")
+                sizes = [os.fstat(file.fileno()).st_size for file in opened]
+                done = _Done(sizes, done.rows + 1, rhythm.year(row), done.axes + means[:, 4])
+                now, share = time.perf_counter(), averages.share
+                if now > saved + SAVED_EVERY:
+                    unfinished.save(averages, done, opened)
+                    saved = now
+                left = left_text(now - begin, (share - first) / (1 - first))
+                show.update(share, f"{100 * share:.1f} %, t = {done.reached / 1000:,.6g} kyr, {left}")
         except KeyboardInterrupt:
             complete = False
-        about = dict(zip(names, (axes / max(rows, 1)).tolist(), strict=True))
-        for file, axis in zip(opened, about.values(), strict=True):
+        axes = dict(zip(names, (done.axes / max(done.rows, 1)).tolist(), strict=True))
+        for file, axis in zip(opened, axes.values(), strict=True):
             file.write(f"# mean semi-major axis {axis:.10f} au\n")
-    return Orbits(files, rows, reached, about, complete)
+        if complete:
+            unfinished.remove()
+    return Orbits(files, done.rows, done.reached, axes, complete)
 
 
 def _seconds(option: str, given: Any) -> float:
@@ -218,42 +263,161 @@ def _start(name: str) -> np.ndarray:
     return np.array(found)
 
 
-def _averages(start: np.ndarray, rhythm: _Rhythm, bodies: list[int]) -> Iterator[tuple[int, np.ndarray]]:
-    """Rows by number, with the means of the bodies' elements (bodies, 5)."""
-    before = _Sun(start, -rhythm.step)
-    before.advance(-rhythm.first * rhythm.steps)
-    planets = _Sun(before.state(), rhythm.step)
-    weights = np.cos(np.pi * np.arange(-rhythm.half, rhythm.half + 1) / (2 * rhythm.half + 2)) ** 2
-    weights /= weights.sum()
-    seen: list[np.ndarray] = []
-    last = (rhythm.rows + BEYOND) * rhythm.looks + rhythm.half
-    for look in range(rhythm.first, last + 1):
-        if (look + rhythm.half) % rhythm.looks <= 2 * rhythm.half:  # within a window
-            seen = [*seen[max(0, len(seen) - 2 * rhythm.half) :], planets.elements(bodies)]
-        row, rest = divmod(look - rhythm.half, rhythm.looks)
-        if not rest and len(seen) == len(weights):
-            yield row, np.tensordot(weights, np.array(seen), 1)
-        planets.advance(rhythm.steps)
+class _Averages:
+    """Rows by number, with the means of the bodies' elements (bodies, 5).
+
+    Attributes:
+        look: number of the last look. seen: elements at the looks that the next row may need. planets: there.
+    """
+
+    def __init__(self, start: np.ndarray, rhythm: _Rhythm, bodies: list[int]) -> None:
+        self._start, self._rhythm, self._bodies = start, rhythm, bodies
+        self._last = (rhythm.rows + BEYOND) * rhythm.looks + rhythm.half
+        self.look, self.seen = rhythm.first - 1, list[np.ndarray]()
+        self.planets: _Sun | None = None
+
+    @property
+    def share(self) -> float:
+        """How much of the way is done."""
+        return (self.look - self._rhythm.first + 1) / (self._last - self._rhythm.first + 1)
+
+    def __iter__(self) -> Iterator[tuple[int, np.ndarray]]:
+        rhythm = self._rhythm
+        weights = np.cos(np.pi * np.arange(-rhythm.half, rhythm.half + 1) / (2 * rhythm.half + 2)) ** 2
+        weights /= weights.sum()
+        while self.look < self._last:
+            if self.planets is None:
+                before = _Sun.begun(self._start, -rhythm.step)
+                before.advance(-rhythm.first * rhythm.steps)
+                self.planets = _Sun.begun(before.state(), rhythm.step)
+            else:
+                self.planets.advance(rhythm.steps)
+            self.look += 1
+            if (self.look + rhythm.half) % rhythm.looks <= 2 * rhythm.half:  # within a window
+                kept = self.seen[max(0, len(self.seen) - 2 * rhythm.half) :]
+                self.seen = [*kept, self.planets.elements(self._bodies)]
+            row, rest = divmod(self.look - rhythm.half, rhythm.looks)
+            if not rest and len(self.seen) == len(weights):
+                yield row, np.tensordot(weights, np.array(self.seen), 1)
+
+
+@dataclass(frozen=True)
+class _Done:
+    """Sizes of the tables, bytes; their rows, time of the last one (years), sums of semi-major axes (au)."""
+
+    sizes: list[int]
+    rows: int
+    reached: float
+    axes: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Unfinished:
+    """The file of a state from which tables are continued, and what has to be the same then."""
+
+    path: Path
+    about: dict[str, Any]
+
+    def save(self, averages: _Averages, done: _Done, opened: Sequence[TextIO] = ()) -> None:
+        """Replace the state, once the tables are on disk."""
+        for file in opened:
+            os.fsync(file.fileno())
+        with atomic.replacing(self.path) as new:
+            content = b"" if averages.planets is None else averages.planets.saved(new)
+            with new.open("wb") as file:
+                about, planets = json.dumps(self.about), np.frombuffer(content, dtype=np.uint8)
+                np.savez(
+                    file, about=about, planets=planets, look=averages.look, seen=averages.seen, **vars(done)
+                )
+
+    def remove(self) -> None:
+        """Remove it, with what killed processes were writing."""
+        for path in (*self.path.parent.glob(f".{self.path.name}.*.partial"), self.path):
+            path.unlink(missing_ok=True)
+
+    def restored(self, averages: _Averages, files: Sequence[Path]) -> _Done:
+        """Set the averages on the state.
+
+        Raises:
+            RunFolderError: it is of other tables, or damaged.
+        """
+        try:
+            with np.load(self.path) as arrays:
+                found = {name: arrays[name] for name in arrays.files}
+            begun = json.loads(str(found["about"]))
+            other = [f"{k} {begun.get(k)}, given {v}" for k, v in self.about.items() if begun.get(k) != v]
+            if other:
+                what = f"was begun with {'; '.join(other)}; give the same, or {FORCE} alone begins again"
+                raise RunFolderError(f"{self.path}: {what}")
+            averages.look, averages.seen = int(found["look"]), list(found["seen"])
+            averages.planets = _Sun.restored(found["planets"].tobytes()) if found["planets"].size else None
+            sizes, rows, reached = found["sizes"].tolist(), int(found["rows"]), float(found["reached"])
+        except (OSError, ValueError, KeyError, RuntimeError, BadZipFile) as error:
+            raise RunFolderError(f"{self.path}: is damaged ({error}); {FORCE} alone begins again") from None
+        for file, size in zip(files, sizes, strict=True):
+            if size > (file.stat().st_size if file.exists() else 0):
+                raise RunFolderError(f"{file}: rows were removed since; {FORCE} alone begins again")
+        return _Done(sizes, rows, reached, found["axes"])
+
+
+@contextmanager
+def _writing(first: Path) -> Iterator[None]:
+    """Keep other processes out of tables whose folder has the first of them, and say why writing stopped."""
+    with ExitStack() as stack:
+        try:
+            folder = os.open(first.parent, os.O_RDONLY)
+            stack.callback(os.close, folder)
+            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise RunFolderError(
+                f"{first.parent}: another process is at work there; wait for it, or choose another {OUT}"
+            ) from None
+        try:
+            yield
+        except OSError as error:
+            what = f"can't be written: {error.strerror or error}; {once_mended(error)}, {RESUMED} continues"
+            raise RunFolderError(f"{error.filename or first}: {what}") from None
 
 
 class _Sun:
-    """The Sun with its planets in REBOUND."""
+    """The Sun with its planets in REBOUND: a simulation, ready for steps."""
 
-    def __init__(self, state: np.ndarray, step: float) -> None:
+    def __init__(self, simulation: Any) -> None:
+        self._simulation, self._forces = simulation, _forces(len(simulation.particles))
+        simulation.additional_forces = self._forces.address
+
+    @classmethod
+    def begun(cls, state: np.ndarray, step: float) -> _Sun:
+        """At rest in their common centre, from G M, places and velocities."""
         import rebound
 
-        self._simulation = rebound.Simulation()
-        self._simulation.G = 1.0
+        simulation = rebound.Simulation()
+        simulation.G = 1.0
         for m, x, y, z, vx, vy, vz in state:
-            self._simulation.add(m=m, x=x, y=y, z=z, vx=vx, vy=vy, vz=vz)
-        self._simulation.move_to_com()
-        self._simulation.integrator = "whfast"
-        whfast = self._simulation.integrator
+            simulation.add(m=m, x=x, y=y, z=z, vx=vx, vy=vy, vz=vz)
+        simulation.move_to_com()
+        simulation.integrator = "whfast"
+        whfast = simulation.integrator
         # looks leave the motion as it is
         whfast.corrector, whfast.safe_mode, whfast.keep_unsynchronized = 11, 0, 1
-        self._simulation.dt = step
-        self._forces = _forces(len(state))
-        self._simulation.additional_forces = self._forces.address
+        simulation.dt = step
+        return cls(simulation)
+
+    @classmethod
+    def restored(cls, content: bytes) -> _Sun:
+        """As they were saved, in every bit."""
+        import rebound
+
+        with NamedTemporaryFile() as file, warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # forces have to be set again
+            file.write(content)
+            file.flush()
+            return cls(rebound.Simulation(file.name))
+
+    def saved(self, path: Path) -> bytes:
+        """REBOUND's own archive of one state, by way of a new file."""
+        self._simulation.save_to_file(str(path), delete_file=True)
+        return path.read_bytes()
 
     def advance(self, steps: int) -> None:
         """Take steps."""

@@ -66,7 +66,7 @@ QUICK = {
     "export runs/free --format oem --out free.oem --epoch J2000 --frame ICRF --object-id 2000-001A": 0,
     "export runs/free --out free.csv --angle-unit deg --variable quaternion": 0,
     "export runs/free --out free.doc": 2,
-    "orbits pluto --end -1kyr --every 1kyr --window 0 --kernel de421 --out here --force --json": 2,
+    "orbits pluto --end -1kyr --every 1kyr --window 0 --kernel de421 --out here --force --resume --json": 2,
     "schema": 0,
     "--version": 0,
     "--help": 0,

@@ -58,8 +58,8 @@ def test_members_in_lanes_follow_the_equations(seed: int, tmp_path: Path) -> Non
     )
     table = "\n".join(", ".join(f"{x:.16g}" for x in cells) for cells in (rows[::way]).tolist())
     every, count = years[-5] / 20 * draw.uniform(0.9, 1), draw.randint(3, 6)
-    # the Moon's place isn't known: no model is measured, which would take seconds for each member
-    announced, tight = tidal and seed > first_seed(), draw.random() < 0.5
+    # with the Moon, whose place isn't known, no model is measured, which takes seconds for each member
+    announced, tight = seed > first_seed() and (tidal or seed % 10 == 7), draw.random() < 0.5
     suns, tilts, tides = (
         [draw.uniform(*ends) for _ in range(count)] for ends in ((0.9 * SUN, 1.1 * SUN), (0.3, 1.2), (0, 2))
     )
@@ -108,9 +108,15 @@ def test_members_in_lanes_follow_the_equations(seed: int, tmp_path: Path) -> Non
         assert np.abs(axes - alone.momentum_axis.values[member]).max() < 1e-13
         assert np.abs(seen.precession.values[member] - alone.precession.values[member]).max() < 1e-12
     if announced:
-        ratios = seen.attitude_error.values / alone.attitude_error.values
-        assert ((ratios > 0.1) & (ratios < 10)).all()
+        more = ["sweep.batch=false", "output.estimate=false", 'integrator.precision="quadruple"']
+        more.append('integrator.tolerance="auto"')
+        exact = rigidsim.sweep(rigidsim.parse(text, overrides=more), out=tmp_path / "exact").dataset
+        wrong = np.abs(seen.momentum_axis.values - exact.momentum_axis.values).max(axis=(1, 2))
+        assert (wrong <= 3 * seen.attitude_error.values).all()
+        assert (seen.attitude_error.values < 10 * alone.attitude_error.values).all()
         np.testing.assert_array_equal(seen.warnings.values, alone.warnings.values)
+        # measured from samples that differ by rounding
+        np.testing.assert_allclose(seen.modelling_error.values, alone.modelling_error.values, rtol=1e-4)
     rigidsim.sweep(rigidsim.parse(text), out=tmp_path / "parts", tiles=(1, 2))
     again = rigidsim.sweep(rigidsim.parse(text), out=tmp_path / "parts").dataset.load()
     for name in ("momentum_axis", "precession", "steps", "attitude_error"):

@@ -1,9 +1,5 @@
 """Tables of the planets' orbits, against DOP853 and the ephemeris from which they start."""
 
-import signal
-import subprocess
-import sys
-import time
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -13,6 +9,7 @@ from scipy.integrate import solve_ivp
 from support import cases
 
 import rigidsim
+from rigidsim.workflows import orbits
 from rigidsim.workflows.orbits import PLANETS, write_orbits
 
 here = pytest.mark.skipif(
@@ -144,33 +141,36 @@ def test_a_scene_reads_the_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 @here
-def test_after_ctrl_c_the_rows_are_kept(tmp_path: Path) -> None:
-    line = [
-        sys.executable,
-        "-m",
-        "rigidsim",
-        "orbits",
-        "earth",
-        "--end=-1 Myr",
-        "--every",
-        "10 yr",
-        "--window",
-        "0",
-    ]
-    process = subprocess.Popen(line, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
-    table, begun = tmp_path / "earth.csv", time.monotonic()
-    while not table.exists() or len(table.read_text().splitlines()) < 30:
-        assert process.poll() is None
-        assert time.monotonic() - begun < 60
-        time.sleep(0.05)
-    kept = table.read_text()
-    process.send_signal(signal.SIGINT)
-    said = process.communicate(timeout=20)[1]
-    assert process.returncode == 130
-    assert "interrupted" in said
-    assert "the rows are kept" in said
-    assert table.read_text().startswith(kept.rpartition("\n")[0])
-    assert np.diff(rows(table)[:, 0]) == pytest.approx(-10)
+def test_interrupted_tables_are_continued_with_the_same_bits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = {"planets": ["earth", "mars"], "end": "-400 yr", "every": "20 yr", "window": "50 yr"}
+    (tmp_path / "whole").mkdir()
+    whole = write_orbits(**asked, out=tmp_path / "whole")
+    left_text, rows_left = orbits.left_text, [0]
+
+    def until_ctrl_c(*given: float) -> str:
+        rows_left[0] -= 1
+        if not rows_left[0]:
+            raise KeyboardInterrupt
+        return left_text(*given)
+
+    monkeypatch.setattr(orbits, "left_text", until_ctrl_c)
+    for seconds, rows_left[0] in ((0.0, 2), (1e9, 3), (0.0, 9)):  # the second loses its rows again
+        monkeypatch.setattr(orbits, "SAVED_EVERY", seconds)
+        assert not write_orbits(**asked, out=tmp_path, resume=True).complete
+    assert len(rows(tmp_path / "mars.csv")) == 11
+    for more, says in (
+        ({}, "--resume|resume=True"),
+        ({"every": "10 yr", "resume": True}, "was begun with every 20 yr, given 10 yr"),
+    ):
+        with pytest.raises(rigidsim.RigidsimError, match=says):
+            write_orbits(**(asked | more), out=tmp_path)
+    found = write_orbits(**asked, out=tmp_path, resume=True)
+    assert (found.rows, found.axes, found.complete) == (whole.rows, whole.axes, True)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["earth.csv", "mars.csv", "whole"]
+    for name in ("earth.csv", "mars.csv"):
+        assert (tmp_path / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
 REFUSED = {
