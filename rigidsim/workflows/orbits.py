@@ -208,6 +208,7 @@ def write_orbits(
         axes = dict(zip(names, (done.axes / max(done.rows, 1)).tolist(), strict=True))
         for file, axis in zip(opened, axes.values(), strict=True):
             file.write(f"# mean semi-major axis {axis:.10f} au\n")
+            file.flush()
         if complete:
             unfinished.remove()
     return Orbits(files, done.rows, done.reached, axes, complete)
