@@ -199,7 +199,9 @@ def _tables_of_members(
     names = [str(name) for name, found in dataset.data_vars.items() if set(members) <= set(found.dims)]
     names.sort(key=lambda name: (_FIRST.index(name) if name in _FIRST else len(_FIRST), name))
     for name in names:
-        dim = next((str(dim) for dim in dataset[name].dims if _is_long(str(dim), members)), MEMBER)
+        # points of long dimensions become rows; of others, components of vectors, they become columns
+        beside = (dim for dim in map(str, dataset[name].dims) if dim not in members)
+        dim = next((dim for dim in beside if dim in _LONG or dim.endswith("_occurrence")), MEMBER)
         kept.setdefault(dim, []).append(name)
     numbered = np.arange(dataset["status"].size).reshape(dataset["status"].shape)
     made = {MEMBER: _made(members, numbered, "number of the member, the last axis fastest")}
@@ -222,11 +224,6 @@ def _tables_of_members(
         values = columns(names, dim)
         found.append(Table(dim, every, dataset, bits, members, values, block_numbers, made))
     return found
-
-
-def _is_long(dim: str, members: Sequence[str]) -> bool:
-    """Whether a dimension's points become rows; points of others, components of vectors, become columns."""
-    return dim not in members and (dim in _LONG or dim.endswith("_occurrence"))
 
 
 def _made(dims: Sequence[str], values: np.ndarray, long_name: str) -> xarray.Variable:

@@ -75,8 +75,7 @@ from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.arithmetic import bits_in_use, cosine_and_sine
 from rigidsim.scene.kepler import regular_place
-from rigidsim.scene.kernels.reading import Ephemeris, RelativeEphemeris
-from rigidsim.scene.kernels.series import BlockSeries, chebyshev, exactly
+from rigidsim.scene.kernels.reading import BlockSeries, Ephemeris, RelativeEphemeris, chebyshev, exactly
 from rigidsim.scene.orbit_tables import AXIS, LONGITUDE, TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.point_masses import PointMasses

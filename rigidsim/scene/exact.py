@@ -211,7 +211,8 @@ def _read(text: str, known: Mapping[str, _Unit], expected: str = "") -> _Unit:
 
 
 def _unknown(word: str, known: Mapping[str, _Unit], expected: str) -> UnitError:
-    listed = _units_for(expected) if expected else known_units()
+    every = f"known units: {' '.join(line.split()[0] for line in _TABLE)}, with SI prefixes, * / ^"
+    listed = _units_for(expected) if expected else every
     if _OFFSET.fullmatch(word):
         what = f'"{word}" has an offset, which no unit may have; write the temperature in kelvin, "K"'
         return UnitError(f"{what}; {listed}")
@@ -279,11 +280,6 @@ def unit_text(dimension: Powers) -> str:
     if not under:
         return over
     return f"{over or '1'}/{under if ' ' not in under else f'({under})'}"
-
-
-def known_units() -> str:
-    """A line that lists the units, for error messages."""
-    return f"known units: {' '.join(line.split()[0] for line in _TABLE)}, with SI prefixes, * / ^"
 
 
 def conversion(text: str, expected: str) -> tuple[Fraction, int]:

@@ -414,13 +414,9 @@ VariableName = Annotated[
 ]
 
 
-def _number_as_name(value: Any) -> Any:
-    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
-
-
 BodyName = Annotated[
     StrictStr,
-    BeforeValidator(_number_as_name),
+    BeforeValidator(lambda value: str(value) if type(value) is int else value),
     WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "integer"}]}),
 ]
 """A body of a kernel, by its name or NAIF's number, with or without quotes."""

@@ -69,10 +69,6 @@ class Interpolation:
         self.lengths, self.values = lengths, values
         self._even = bool((lengths == lengths[:1]).all())
 
-    def narrowed(self) -> Interpolation:
-        """The same in the platform's longest floating point, of at least double precision."""
-        return Interpolation(in_80_bits(self.lengths), in_80_bits(self.values))
-
     def pieces(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Of pieces (n,) lengths (n,), and coefficients (n, 6, columns) of the powers of
         (t - t_i) / (t_{i+1} - t_i). Floats must not grow beyond order one.
@@ -549,7 +545,8 @@ class TabulatedOrbit:
 
     @cached_property
     def _narrow(self) -> Interpolation:
-        return self._interpolation.narrowed()
+        whole = self._interpolation
+        return Interpolation(in_80_bits(whole.lengths), in_80_bits(whole.values))
 
     def row(self, number: int) -> dict[str, Any]:
         """All elements of a row of the table."""

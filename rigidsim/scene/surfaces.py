@@ -176,11 +176,9 @@ def _kinds(
     drawn = [[generator.choice((1, -1)) for _ in arguments] for _ in states]
     agreement = negligible(context)
 
-    def inner_first(item: tuple[Expression, Surface]) -> int:
-        return sum(1 for _ in nodes(item[1].expression))
-
+    inner_first = sorted(arguments.items(), key=lambda item: sum(1 for _ in nodes(item[1].expression)))
     with context.workprec(context.prec + GUARD_BITS):
-        for node, surface in sorted(arguments.items(), key=inner_first):
+        for node, surface in inner_first:
             parts = [on_sides(surface.expression, found, sides) for sides in drawn]
             values = [value_at(part, state, context) for part, state in zip(parts, states, strict=True)]
             for index, others in enumerate(known):

@@ -100,7 +100,7 @@ from rigidsim.scene.fields import (
     name_or_vector,
     one_of,
 )
-from rigidsim.scene.kernels.series import exactly
+from rigidsim.scene.kernels.reading import exactly
 from rigidsim.scene.orbits import (
     SIDES,
     Elements,

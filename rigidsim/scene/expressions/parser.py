@@ -128,14 +128,15 @@ _Meant = tuple[Expression, "Measure"]
 
 
 def _constant(node: Constant) -> _Meant:
-    return replace(node, value=node.value.alone), _measure_of_constant(node)
+    measure = Measure(powers(node.value.unit), written=True) if node.value.unit else ANY
+    return replace(node, value=node.value.alone), measure
 
 
 def _named(node: Name) -> _Meant:
-    meant: Expression = node
+    meant, unit = node, node.of.unit
     if node.of.formula:
         meant = placed(parse_expression(node.of.formula, node.of.parts), node.place, anew=True)
-    return meant, _measure_of_name(node)
+    return meant, ANY if unit is None else Measure(powers(unit)) if unit else NUMBER
 
 
 def _operated(node: Operation, meant: list[_Meant]) -> _Meant:
@@ -384,18 +385,6 @@ class Measure:
 
 
 NUMBER, ANY = Measure(()), Measure(None)
-
-
-def _measure_of_constant(node: Constant) -> Measure:
-    """Dimension of a number: the dimension of its unit, if it has one."""
-    unit = node.value.unit
-    return Measure(powers(unit), written=True) if unit else ANY
-
-
-def _measure_of_name(node: Name) -> Measure:
-    """Dimension of what a name stands for."""
-    unit = node.of.unit
-    return ANY if unit is None else Measure(powers(unit)) if unit else NUMBER
 
 
 def _measure_of_operation(node: Operation, operands: Sequence[Measure], last: Expression | None) -> Measure:

@@ -526,10 +526,6 @@ def _min(a: Expression, b: Expression) -> Expression:
     return (1 - over) * a + over * b
 
 
-def _pulse(x: Expression, begin: Expression, end: Expression) -> Expression:
-    return _step(x - begin) * _step(end - x)
-
-
 def _wrap(x: Expression) -> Expression:
     """x less full turns, in (-pi, pi]: twice the angle of its half, turned to a positive cosine."""
     cosine, sine = (operation(name, _HALF * x) for name in ("cos", "sin"))
@@ -605,7 +601,15 @@ def _square_root(node: Expression) -> Expression | None:
 
 
 _WAYS: Mapping[str, Callable[..., Expression]] = {
-    **{"abs": _abs, "sign": sign, "step": _step, "max": _max, "min": _min, "pulse": _pulse, "wrap": _wrap},
+    **{
+        "abs": _abs,
+        "sign": sign,
+        "step": _step,
+        "max": _max,
+        "min": _min,
+        "pulse": lambda x, begin, end: _step(x - begin) * _step(end - x),
+        "wrap": _wrap,
+    },
     **{"atan2": _atan2, "asin": partial(_inverse, "asin"), "acos": partial(_inverse, "acos")},
     **{"sqrt": _sqrt, "power": _of_power, "e": lambda: operation("exp", constant(1))},
 }
