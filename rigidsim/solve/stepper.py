@@ -50,6 +50,7 @@ class SamplesWithin:
         self.times = times
         self.states: Any = []  # or an array (n, states)
         self.ended = False
+        self._listed = list(times)  # which is looked up in half the time
 
     @property
     def upcoming(self) -> Scalar | None:
@@ -62,11 +63,10 @@ class SamplesWithin:
 
     def passed(self, now: Scalar, dense: Callable[[Scalar], np.ndarray]) -> bool:
         """Take those within a step that ends now; False if it asks to end the call."""
-        count, times = len(self.states), self.times
-        while count < len(times) and times[count] <= now:
-            self.states.append(np.array(dense(times[count])))  # heyoka reuses its buffer
-            count += 1
-        self.ended = now >= self.times[-1]
+        times, states = self._listed, self.states
+        while (count := len(states)) < len(times) and times[count] <= now:
+            states.append(dense(times[count]).copy())  # heyoka reuses its buffer
+        self.ended = now >= times[-1]
         return not self.ended
 
     def within(self, engine: TaylorEngine) -> bool:
