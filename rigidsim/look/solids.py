@@ -126,9 +126,9 @@ def _solid(entry: Mapping[str, Any]) -> Mesh:
     return _two_sided(mesh, _BARE) if entry.get("one_sided") else mesh
 
 
-def _of_triangles(step: float, vertices: str, triangles: str) -> Mesh:
+def _of_triangles(step: float, vertices: str, triangles: str, simplified: bool = False) -> Mesh:
     """A mesh as ``scene.bodies.files`` keeps it, in the colours of the axes that it faces; smooth where its
-    triangles meet nearly flat.
+    triangles meet nearly flat, and at small ones that are left of a simplified mesh.
     """
     places = np.frombuffer(b64decode(vertices), "<i2").reshape(-1, 3) * step
     faces = np.frombuffer(b64decode(triangles), "<u2").reshape(-1, 3)
@@ -139,8 +139,11 @@ def _of_triangles(step: float, vertices: str, triangles: str) -> Mesh:
     flat = areas / sizes[sizes > 0, None]
     around = np.stack([np.bincount(faces.ravel(), np.repeat(x, 3), len(places)) for x in areas.T], axis=1)
     smooth = around[faces] / np.maximum(np.linalg.norm(around[faces], axis=2, keepdims=True), 1e-300)
-    normals = np.where(np.einsum("tij,tj->ti", smooth, flat)[..., None] > _SHARP, smooth, flat[:, None, :])
-    shade = flat**2 * np.where(flat > 0, 1.0, _DARKER)
+    small = simplified & (np.linalg.norm(areas, axis=1) < np.median(sizes))
+    even = (np.einsum("tij,tj->ti", smooth, flat) > _SHARP) | small[:, None]
+    normals = np.where(even[..., None], smooth, flat[:, None, :])
+    facing = normals.mean(axis=1)
+    shade = facing**2 * np.where(facing > 0, 1.0, _DARKER)
     return Mesh(corners, normals, _painted(shade @ np.array(_AXIS_COLORS)), np.zeros((len(faces), 3, 2)))
 
 
@@ -286,22 +289,20 @@ def graticule(half_sizes: Array, step: float = 30.0, lift: float = 1.004) -> lis
 
 
 def sharp_edges(mesh: Mesh) -> Array:
-    """Edges (E, 2, 3) of a mesh along which its faces meet at more than 25 degrees."""
+    """Edges (E, 2, 3) of a mesh along which its surface bends by more than 25 degrees."""
     corners = mesh.corners
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     # No vertices are shared: rounded coordinates identify those at one place.
     keys = np.round(corners.reshape(-1, 3) / mesh.reach() * 1e6).astype(np.int64)
     _, names = np.unique(keys, axis=0, return_inverse=True)
-    names = names.reshape(-1, 3)
-    sides = [[0, 1], [1, 2], [2, 0]]
-    pairs, ends = (np.concatenate([table[:, side] for side in sides]) for table in (names, corners))
-    faces = np.tile(np.arange(len(corners)), 3)
+    tables = (names.reshape(-1, 3), corners, mesh.normals)
+    pairs, ends, normals = (np.concatenate([x[:, side] for side in ([0, 1], [1, 2], [2, 0])]) for x in tables)
+    facing = normals.sum(axis=1)
+    facing /= np.linalg.norm(facing, axis=1, keepdims=True)
     sorted_pairs = np.sort(pairs, axis=1)
     order = np.lexsort((sorted_pairs[:, 1], sorted_pairs[:, 0]))
     same = (sorted_pairs[order[1:]] == sorted_pairs[order[:-1]]).all(axis=1)
     first, second = order[:-1][same], order[1:][same]
-    sharp = np.einsum("ij,ij->i", normals[faces[first]], normals[faces[second]]) < _SHARP
+    sharp = np.einsum("ij,ij->i", facing[first], facing[second]) < _SHARP
     return np.asarray(ends[first[sharp]])
 
 

@@ -39,10 +39,6 @@ def test_a_rod_in_a_strong_field_goes_round_its_limiting_loop() -> None:
     late = (time > np.pi) & (np.abs(h) < 100)
     loop = 0.05 / np.pi * np.arctan(k * (h - 12 * np.sign(-np.sin(time))))
     np.testing.assert_allclose(b[late], loop[late], rtol=0, atol=2e-4 * 0.025)
-    # V times the loop's area: between two branches, out to the field's largest value
-    area = quad(lambda x: 0.05 / np.pi * (np.arctan(k * (x + 12)) - np.arctan(k * (x - 12))), -600, 600)[0]
-    lost = float(data.energy[2000] - data.energy[-1])
-    assert lost == pytest.approx(1e-6 * area, rel=5e-3)
 
 
 LOOP = "1e-6/mu0*0.05/pi*atan(steep*(bx/mu0 - 12*sign(dbx)))"  # Gerhardt & Palo 2010, times volume / mu_0

@@ -93,6 +93,7 @@ def moments_of(path: Path) -> str:
     tensor = (np.trace(second) * np.eye(3) - (second + second.T) / 2) * math.copysign(1, volume)
     tensor[np.abs(tensor) < _ROUNDING * tensor.max()] = 0
     drawn, among = _drawn(vertices - center - off, faces[:, :: 1 if volume > 0 else -1], radius)
+    drawn += ["simplified = true"] if among < len(faces) else []
     lines = [f"# moments of {path.name}, {len(triangles)} triangles, for unit density; {among} are drawn"]
     place = np.where(np.abs(center + off) < _ROUNDING * radius, 0.0, center + off)
     lines += [f"volume = {abs(volume)!r}", f"center = {place.tolist()}"]

@@ -301,8 +301,8 @@ class _Reader:
             what = f"{self.table.file} is one of several files, of which a fit copies one; write one table"
             ensure(file.suffix != ".42", self._fault("file", what))
             saved = file / "dataset.h5"  # where the file is the folder of a run
-            given = Path(f"{file}#{self.table.segment}") if self.table.segment else file
-            found = read_columns(saved if saved.is_file() else given)
+            segment = f"#{self.table.segment}" if self.table.segment else ""
+            found = read_columns(saved if saved.is_file() else Path(f"{file}{segment}"))
             return replace(found, reach=self.scene.reach).in_axes(self.scene.axes)
         if self.scene.epoch is None:
             what = "is a CK, which holds dates; give the date of time 0 as [time] epoch"
@@ -764,8 +764,8 @@ class ByTangents:
         self._names = list(dict.fromkeys(one.variable for one in quantities))
         self._keys = [one.key for one in keys.motion]
         self._sizes = np.array([one.size for one in keys.motion])
-        what = Problem("[fit] parameters", "no number of the motion is estimated")
-        ensure(self._keys, ConfigError(what))
+        none = Problem("[fit] parameters", "no number of the motion is estimated")
+        ensure(self._keys, ConfigError(none))
         integrator = quiet.config.integrator.model_copy(update={"method": DEFAULT_METHOD})
         stepping = replace(quiet, config=quiet.config.model_copy(update={"integrator": integrator}))
         if prepare(stepping).system.wide:
