@@ -14,7 +14,7 @@ space coordinates; only the scalar goes last: Q1 Q2 Q3 QC = x y z w.
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from decimal import Context, Decimal, localcontext
 from itertools import pairwise
@@ -420,5 +420,6 @@ def _keyword(name: str, value: str) -> str:
 
 
 _NAMES = ("epoch", "axes", "object_name", "object_id")
-AEM, APM = (Format(write, names=(*_NAMES, "center", "message")) for write in (write_aem, write_apm))
-OEM = Format(write_oem)
+APM = Format(write_apm, names=(*_NAMES, "center", "message"))
+AEM = replace(APM, write=write_aem, ascending=True)
+OEM = Format(write_oem, ascending=True)

@@ -75,6 +75,7 @@ class Format:
         suffix: of its files; by default the format's name.
         beside: files that it needs beside, by their suffixes, and what writes them.
         between: whether it holds the motion between the samples, too.
+        ascending: whether its times have to ascend: samples of a run into the past are reversed.
         names: fields of ``Naming`` that it has a place for.
         folder: what such a folder is called, and a file that identifies one; None if it writes a file.
     """
@@ -86,6 +87,7 @@ class Format:
     suffix: str = ""
     beside: Mapping[str, Callable[[Any, Path, TableSource], None]] = field(default_factory=dict)
     between: bool = False
+    ascending: bool = False
     names: tuple[str, ...] = ("epoch", "axes", "object_name", "object_id", "center")
 
 

@@ -106,7 +106,7 @@ class SpiceRun:
         self.source, self.table, self.named, self.motion = source, table, named, source.motion
         self.ahead = named.epoch.since_j2000()
         begin, end = (self.ahead + time for time in self.motion.span)
-        end = min(end, self.ahead + self._time(table.rows - 1))
+        begin, end = max(begin, self.ahead + self._time(0)), min(end, self.ahead + self._time(table.rows - 1))
         size = max(abs(time) for time in (begin, end, begin - self.ahead, end - self.ahead))
         self.spacing = Fraction(2) ** (math.frexp(float(size))[1] - 53)
         self.first, self.last = math.ceil(begin / self.spacing), math.floor(end / self.spacing)
@@ -500,8 +500,8 @@ def _frame_for(quaternions: np.ndarray) -> tuple[str, np.ndarray]:
     return frame, there
 
 
-CK = Format(write_ck, suffix=".bc", beside={".tsc": write_clock}, between=True)
-PCK = Format(write_pck, suffix=".bpc", beside={".tf": write_frame}, between=True)
+CK = Format(write_ck, suffix=".bc", beside={".tsc": write_clock}, between=True, ascending=True)
+PCK = Format(write_pck, suffix=".bpc", beside={".tf": write_frame}, between=True, ascending=True)
 
 
 # --- CK of other programs, read -----------------------------------------------------------------------------

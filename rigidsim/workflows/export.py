@@ -76,6 +76,8 @@ def export(
         opened = saved.dataset
     with opened as dataset:
         dataset = _chosen(dataset, variables)
+        if found.ascending and dataset.sizes.get("time", 0) > 1 and dataset["time"][0] > dataset["time"][-1]:
+            dataset = dataset.isel(time=slice(None, None, -1))
         bits = _bits(dataset) if isinstance(saved, SavedRun) else _bits_of_members(dataset)
         first, *others = tables_of(dataset, unit, bits, block_numbers)
         attributes = dict(dataset.attrs, status=saved.status)

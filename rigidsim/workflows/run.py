@@ -348,8 +348,9 @@ class MotionAgain:
 
     @property
     def span(self) -> tuple[Fraction, Fraction]:
-        """Exact times of the first and the last sample of the config, s."""
-        return self._scene.samples.begin, self._scene.samples.exact_last
+        """Exact times of the earliest and the latest sample of the config, s."""
+        ends = self._scene.samples.begin, self._scene.samples.exact_last
+        return min(ends), max(ends)
 
     def at(self, times: Sequence[Fraction]) -> tuple[np.ndarray, np.ndarray]:
         """Quaternions (rows, 4), body to space axes, and angular velocities (rows, 3), body axes, rad/s.
@@ -360,8 +361,9 @@ class MotionAgain:
         Raises:
             RunFolderError: the motion ends before.
         """
-        again = run(self._experiment.quiet(times=times), out=None, progress=False)
-        found = again.dataset
+        way = self._scene.samples.direction
+        again = run(self._experiment.quiet(times=times[::way]), out=None, progress=False)
+        found = again.dataset.isel(time=slice(None, None, way))
         if found.sizes["time"] != len(times):
             raise RunFolderError(f"{self.dataset}: integrated again, the run {again.outcome.message}")
         return found[ATTITUDE].values, found[RATES].values

@@ -1,5 +1,6 @@
 """CK and binary PCK of runs, read back by SPICE: attitude and angular velocity between the rows, to 1e-12."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from fractions import Fraction
@@ -57,10 +58,12 @@ def agrees(
     """SPICE's matrices and rates are the run's, sampled anew at random times that both know exactly."""
     numbers = np.random.default_rng(5)
     time = rigidsim.parse(text, overrides=settings).config.time
-    first, last = (float(ahead + x.rational) for x in (time.start, time.end))
+    way = 1 if time.end.rational > time.start.rational else -1
+    first, last = (float(ahead + x.rational) for x in (time.start, time.end)[::way])
     unit = max(np.spacing(abs(x)) for x in (first, last, last - first))
     steps = np.unique(numbers.integers(1, int((last - first) / unit), count))
     dates = [Fraction(first) + int(k) * Fraction(unit) for k in steps]
+    dates = dates[::way]
     times = ", ".join(f'"{float(date - ahead)!r}"' for date in dates)
     removed = "time.samples=", "time.end="
     found = run_text(text, *settings, *removed, f"time.times=[{times}]").dataset
@@ -93,6 +96,8 @@ TURNED = Rotation.from_rotvec([np.radians(84381.406 / 3600), 0, 0])
     ("kind", "settings", "ahead", "says"),
     [
         ("ck", ("time.start=-250.5", "time.end=0.5", "time.samples=3"), T2029, ""),
+        ("ck", ("time.start=0.5", "time.end=-250.5", "time.samples=3"), T2029, ""),
+        pytest.param("pck", ("time.end=-250",), T2029, "", marks=pytest.mark.slow),
         pytest.param("pck", ('frame.axes="ecliptic J2000"',), T2029, "84381.406", marks=pytest.mark.slow),
         pytest.param("pck", SLOW, Fraction(-457963200), "", marks=pytest.mark.slow),
     ],
@@ -108,6 +113,24 @@ def test_spice_reads_the_run(
     agrees(SATELLITE, settings, files, ahead, "SAT", turn=turn)
     assert says in told(files[0])
     assert files[0].stat().st_size < 4e6
+
+
+@pytest.mark.parametrize("kind", ["aem", "oem"])
+def test_rows_of_messages_ascend_in_runs_into_the_past(kind: str, tmp_path: Path) -> None:
+    flying = SATELLITE.replace("[initial]", "[initial]\nposition = [7e6, 0, 0]\nvelocity = [0, 7e3, 0]")
+    run, (file, *_) = written(flying, kind, tmp_path, "time.end=-500", "body.mass=1")
+    keys = dict(re.findall(r"^(\S+) = (.*)$", file.read_text(), re.M))
+    cells = re.findall(r"^(2029\S+) (.*)$", file.read_text(), re.M)
+    dates = [date for date, _ in cells]
+    assert [keys["START_TIME"], *dates, keys["STOP_TIME"]] == sorted([*dates, dates[0], dates[-1]])
+    assert dates[-1] == "2029-04-13T21:46:00"
+    found = np.array([list(map(float, numbers.split())) for _, numbers in cells])[::-1]
+    known = run.dataset
+    if kind == "aem":
+        apart = Rotation.from_quat(found).inv() * Rotation.from_quat(known.quaternion.values[:, [1, 2, 3, 0]])
+        assert apart.magnitude().max() < 1e-14
+    else:
+        np.testing.assert_allclose(found[:, :3] * 1e3, known.position.values, rtol=1e-14)
 
 
 @pytest.mark.parametrize(
