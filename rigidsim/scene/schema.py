@@ -183,12 +183,14 @@ class Initial(Motion):
 class Model(ConfigTable):
     """``[model]``: every rotation, or the motion averaged over it, or over the sources' orbits as well."""
 
-    rules = tuple(
+    rules = (
         Never(
-            lambda table, key=key: key in table.model_fields_set and table.level == "full",
-            f'{key} is given with level = "full", but is for averaged levels: leave it out',
-        )
-        for key in ("order", "start", "geodetic_precession")
+            lambda table: (
+                table.level == "full" and table.model_fields_set & {"order", "start", "geodetic_precession"}
+            ),
+            'start, geodetic_precession or order is given with level = "full", but is for averaged levels: '
+            "leave it out",
+        ),
     )
 
     level: Literal["full", "spin_averaged", "orbit_averaged", "auto"] = "full"

@@ -6,17 +6,20 @@ Each row depends on its own time and attitude alone, so that no resumption can b
 
 import json
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, RunFolderError
 from rigidsim.model.orbits import sights_of
 from rigidsim.model.system import Invariant
-from rigidsim.scene.kernels.reading import date_of
+from rigidsim.scene.frame import Figure
+from rigidsim.scene.kernels.reading import KernelError, date_of
+from rigidsim.scene.kernels.spice import Orientation
+from rigidsim.scene.rotations import product, quaternion_of, rotation_matrix
 from rigidsim.scene.scene import Scene
 from rigidsim.session.dates import Dates
 from rigidsim.solve.assembly import Assembly
@@ -28,17 +31,6 @@ from rigidsim.solve.status import Status
 from rigidsim.store import provenance
 from rigidsim.store.summary import EventTimes, Summary
 from rigidsim.store.variables import LABELS, OF_THE_RUN, SCHEMA_VERSION, Extra, Variable, time_variable
-
-if TYPE_CHECKING:
-    from rigidsim.session.dataset import PublishedAttitude
-from collections.abc import Mapping
-from dataclasses import dataclass
-
-from rigidsim.errors import RunFolderError
-from rigidsim.scene.frame import Figure
-from rigidsim.scene.kernels.reading import KernelError
-from rigidsim.scene.kernels.spice import Orientation
-from rigidsim.scene.rotations import product, quaternion_of, rotation_matrix
 
 LYAPUNOV_NAMES = ("lyapunov_time", "lyapunov_index", "lyapunov_exponents")
 """Names of variables and dimensions."""
@@ -98,8 +90,6 @@ def published_of(prepared: InitialValueProblem) -> "PublishedAttitude | None":
     orientation, scene = prepared.scene.orientation, prepared.scene
     if orientation is None:
         return None
-    from rigidsim.session.dataset import QUATERNION, PublishedAttitude
-
     if not any(recorded.name == QUATERNION for recorded in prepared.system.recorded):
         named = scene.config.output.record
         lacking = f"isn't recorded; name {QUATERNION} in record" if named else "this model doesn't have"

@@ -133,7 +133,8 @@ def _constant(node: Constant) -> _Meant:
 
 
 def _named(node: Name) -> _Meant:
-    meant, unit = node, node.of.unit
+    unit = node.of.unit
+    meant: Expression = node
     if node.of.formula:
         meant = placed(parse_expression(node.of.formula, node.of.parts), node.place, anew=True)
     return meant, ANY if unit is None else Measure(powers(unit)) if unit else NUMBER
