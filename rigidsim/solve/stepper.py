@@ -277,13 +277,15 @@ def bound_of_sparse_series(coefficients: np.ndarray) -> float:
     return shortest * math.exp(-2 - 0.7 / (order - 1))  # as heyoka's own (Jorba & Zou 2005)
 
 
-def may_be_sparse(coefficients: np.ndarray) -> np.ndarray:
-    """Which of many steps, by their coefficients (n, states, order + 1), may have such a bound."""
+def may_be_sparse(states: np.ndarray, coefficients: np.ndarray, order: int) -> np.ndarray:
+    """Which of many steps may have such a bound, by the states (n, states) where they begin and their later
+    coefficients (n, states, terms), from ``order // 2 + 1`` on.
+    """
     with np.errstate(all="ignore"):
         sizes = reduce(np.maximum, np.abs(coefficients.astype(np.float64, copy=False)).swapaxes(0, 1))
-        order = sizes.shape[1] - 1
         terms = np.arange(order // 2 + 1, order + 1)
         entire = np.array([math.lgamma(term + 1) / term for term in terms])
-        radii = (np.log(np.maximum(sizes[:, :1], 1.0)) - np.log(sizes[:, terms])) / terms
+        base = np.maximum(np.abs(states.astype(np.float64, copy=False)).max(axis=1, keepdims=True), 1.0)
+        radii = (np.log(base) - np.log(sizes)) / terms
         expected = (radii + (entire[-1] - entire))[:, :-2].min(axis=1)
         return ~(radii[:, -2:].min(axis=1) <= math.log(_SPARSE) + expected - 1e-6)

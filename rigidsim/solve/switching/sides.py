@@ -153,7 +153,7 @@ def one(state: np.ndarray, time: Scalar, pars: np.ndarray) -> tuple[np.ndarray, 
 def _by_columns(function: Any, states: np.ndarray, times: np.ndarray, pars: np.ndarray) -> np.ndarray:
     """Values (outputs, n), float64, of a compiled function at many states."""
     found = function(np.ascontiguousarray(states.T), pars=np.ascontiguousarray(pars.T), time=times)
-    return np.asarray(found.astype(np.float64))
+    return np.asarray(found.astype(np.float64, copy=False))
 
 
 @dataclass(frozen=True)

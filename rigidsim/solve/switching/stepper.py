@@ -75,11 +75,10 @@ class _Passed(NamedTuple):
         switches: number and begin of the switches that may accumulate.
         samples: number of samples taken up to here.
         size: of the step, which may be negative.
-        series: Taylor coefficients of the step if it began on a surface, (states, order + 1).
+        series: the later half of the Taylor coefficients of the step, if it began on a surface.
     """
 
     time: tuple[Scalar, Scalar]
-    state: np.ndarray
     events: int
     crossed: int
     switches: tuple[int, float]
@@ -104,6 +103,7 @@ class SwitchingStepper(TaylorStepper):
     ) -> None:
         self._cut: tuple[int, int] | None = None  # surface on which the engine ended it, and the new side
         self._passed: list[_Passed] | None = None  # boundaries, while many steps are taken
+        self._states = precision.zeros((_MOST_AHEAD + 1, len(system.states)))  # there, after where they begin
         self._halted = self._fresh = False
         self._ahead = _FIRST_AHEAD
         self._functions_by_chart: dict[int, SurfaceFunctions] = {}
@@ -119,6 +119,7 @@ class SwitchingStepper(TaylorStepper):
         self._piece: np.ndarray | None = None  # parameters of the piece in which the latest step was
         self._now = np.zeros(0)  # parameters that sides and equations read, all of them, where steps begin
         self._off, self._signs = precision.of_double(0.0), precision.of_doubles(np.array([-1.0, 1.0]))
+        self._narrow = np.array([self._moments.may_mistake(j) for j in range(len(self._modes))], dtype=bool)
         self._beside = 2.0 ** (-precision.bits - BESIDE)
         self._usual = [self._beside] * len(self._modes) + [0.0] * len(system.crossings)
         super().__init__(system, precision, tolerance, start, log)
@@ -161,7 +162,8 @@ class SwitchingStepper(TaylorStepper):
             if boundary.crossed >= 0:
                 modes[boundary.crossed] *= -1
         memory = tiny, (*modes, *sides[len(modes) : -3], -(last.crossed + 1), *last.switches)
-        return self.back_to(Mark(last.time, last.state, last.events, begun.steps + len(passed), memory))
+        state, steps = self._states[len(passed)].copy(), begun.steps + len(passed)
+        return self.back_to(Mark(last.time, state, last.events, steps, memory))
 
     def back_to(self, mark: Mark) -> None:
         tiny, sides = mark.memory
@@ -408,8 +410,10 @@ class SwitchingStepper(TaylorStepper):
         self, passed: list[_Passed], knot: tuple[Scalar, Scalar] | None, samples: SamplesWithin | None
     ) -> StepCallback:
         """What notes each boundary among many; with few look-ups, as a step takes some ten times as long."""
-        engine, first, found = self._integrator, self._count_of_pars, self.log.found
-        state, pars, series = engine.state, engine.pars, engine.tc  # views that follow the engine
+        engine, first, found, states = self._integrator, self._count_of_pars, self.log.found, self._states
+        # views that follow the engine
+        state, pars, series = engine.state, engine.pars, engine.tc[:, engine.order // 2 + 1 :]
+        states[0], dense = state, engine.update_d_output
         clocked = self._functions.clocked and self.system.pieces is None and len(pars) >= first
         taken, upcoming = (0, None) if samples is None else (len(samples.states), samples.upcoming)
         added, quiet = pars[first:], not self.has_events
@@ -427,12 +431,13 @@ class SwitchingStepper(TaylorStepper):
             if clocked:
                 pars[first - 1] = time[1]
             if samples is not None and (upcoming is None or time[0] >= upcoming):
-                going = samples(engine)
+                going = samples.passed(time[0], dense)
                 taken, upcoming = len(samples.states), samples.upcoming
             crossed, switches = -1 if cut is None else cut[0], (self._count, self._since)
             kept = series.copy() if self._fresh else None
-            held = time, state.copy(), len(found), crossed, switches, taken, engine.last_h, kept
+            held = time, len(found), crossed, switches, taken, engine.last_h, kept
             passed.append(tuple.__new__(_Passed, held))  # a third of the time of _Passed(...)
+            states[len(passed)] = state
             if cut is None and not quiet:
                 self._quieten(None)
             self._cut, self._fresh = None, cut is not None
@@ -448,9 +453,9 @@ class SwitchingStepper(TaylorStepper):
         """
         if not passed:
             return 0, False
-        both, reached, _, cut, _, _, sizes, kept = zip(*passed, strict=True)
-        states = np.concatenate([begun.state, *reached]).reshape(-1, len(begun.state))
-        before, here, times, crossed = states[:-1], states[1:], np.array([x for x, _ in both]), np.array(cut)
+        both, _, cut, _, _, sizes, kept = zip(*passed, strict=True)
+        before, here = self._states[: len(passed)], self._states[1 : len(passed) + 1]
+        times, crossed = np.array([x for x, _ in both]), np.array(cut)
         rows = np.flatnonzero(crossed >= 0)
         j, each, flips = crossed[rows], np.arange(len(rows)), np.ones((len(passed), len(self._modes)))
         flips[rows, j] = -1.0
@@ -470,16 +475,18 @@ class SwitchingStepper(TaylorStepper):
             beyond = self._functions.looks(here[rows], times[rows], flipped)
             least = sides[rows, j] * np.array([look.rates[j, rows], beyond.rates[j, each]])
             noise = np.maximum(look.rate_noises[j, rows], beyond.rate_noises[j, each])
-            narrow = np.array([self._moments.may_mistake(k) for k in j])
-            there = ~narrow | (size <= _MISTAKEN * widths)[j, rows]
+            there = ~self._narrow[j] | (size <= _MISTAKEN * widths)[j, rows]
             bad[rows] |= near[rows] | ~(there & (least.min(axis=0) > noise))
             if self.has_events:
                 value, width = self._functions.crossings(here[rows], times[rows], pars[rows])
                 bad[rows] |= (np.abs(value) <= width).any(axis=0)
-        fresh = [row for row, series in enumerate(kept) if series is not None]
-        maybe = may_be_sparse(np.array([kept[row] for row in fresh])) if fresh else np.zeros(0)
-        for row in np.array(fresh, dtype=int)[np.flatnonzero(maybe)].tolist():
-            bad[row] |= bound_of_sparse_series(kept[row]) < abs(float(sizes[row]))
+        if fresh := [row for row, series in enumerate(kept) if series is not None]:
+            order = self._integrator.order
+            maybe = may_be_sparse(before[fresh], np.array([kept[row] for row in fresh]), order)
+            for row in np.array(fresh)[maybe].tolist():
+                series = np.zeros((before.shape[1], order + 1), dtype=before.dtype)
+                series[:, 0], series[:, order // 2 + 1 :] = before[row], kept[row]
+                bad[row] |= bound_of_sparse_series(series) < abs(float(sizes[row]))
         first = int(np.argmax(bad)) if bad.any() else len(passed)
         again = int(np.argmax(near)) + 1 if near.any() else len(passed)
         return min(first, again), first < again and first < len(passed)
