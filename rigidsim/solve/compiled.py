@@ -105,7 +105,10 @@ def compiled_function(
 
 
 def compiled_engine(equations: Sequence[Any], initial: Any, **options: Any) -> TaylorEngine:
-    """Like ``heyoka.taylor_adaptive`` without events, but cached; each caller gets its own engine."""
+    """Like ``heyoka.taylor_adaptive``, but cached where there are no events; each caller gets a copy."""
+    options = {name: x for name, x in options.items() if not (name.endswith("events") and not x)}
+    if "t_events" in options or "nt_events" in options:
+        return hy.taylor_adaptive(list(equations), initial, **options)
     made = ENGINES.get(
         (list(equations), initial, sorted(options.items())),
         lambda: hy.taylor_adaptive(list(equations), initial, **options),

@@ -25,7 +25,7 @@ from rigidsim.scene.expressions.tree import ExpressionError, evaluate, names_use
 from rigidsim.scene.paths import numbers
 from rigidsim.scene.scene import Scene, build_scene, check_start, start_values, without_apart
 from rigidsim.scene.surfaces import root_parts
-from rigidsim.solve.compiled import compiled_function
+from rigidsim.solve.compiled import compiled_engine, compiled_function
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.solvers.algorithm import Algorithm, algorithm_of
@@ -370,7 +370,7 @@ def _begins(system: System, precision: Precision) -> bool:
     followed = [(hy.make_vars(f"followed_{n}"), x.expression) for n, x in enumerate(system.crossings)]
     initial = [*system.initial, *[mpmath.mpf(0) for _ in followed]]
     options = {**precision.options, **_sides(system, precision), "time": _start(system, precision)}
-    engine = hy.taylor_adaptive(
+    engine = compiled_engine(
         [*system.equations, *followed],
         precision.array(initial),
         tol=precision.number(mpmath.mpf(_ROUGH)),

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import heyoka as hy
 import numpy as np
 
+from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import TaylorEngine, compiled_engine, interruptible
 from rigidsim.solve.events import EventLog, engine_events
@@ -88,15 +90,18 @@ class TaylorStepper(Stepper):
         """Must be called after the state was set from outside."""
 
     def _compiled(self, system: System) -> TaylorEngine:
+        noted = engine_events(system, self.precision, self.log, start=self._start) if self.has_events else []
+        return self._engine_of(system, system.equations, nt_events=noted)
+
+    def _engine_of(
+        self, system: System, equations: Sequence[tuple[Symbolic, Symbolic]], **more: Any
+    ) -> TaylorEngine:
+        """The engine of equations in a system's states, with events and other options."""
         options = dict(self.precision.options, time=self._start)
         options["compact_mode"] = self.precision.compact or system.wide
         if self._tolerance is not None:
             options["tol"] = self._tolerance
-        initial = self.precision.array(system.initial)
-        if not self.has_events:
-            return compiled_engine(system.equations, initial, **options)
-        events = engine_events(system, self.precision, self.log, start=self._start)
-        return hy.taylor_adaptive(system.equations, initial, nt_events=events, **options)
+        return compiled_engine(equations, self.precision.array(system.initial), **options | more)
 
     def _system_of(self, chart: int) -> System:
         found = self.system if chart == 0 else self.system.partner

@@ -60,6 +60,13 @@ class SurfaceValues:
         largest = np.max([np.abs(np.atleast_2d(given).astype(np.float64)) for given in states], axis=0)
         return _ROUNDINGS * self.epsilon * (np.abs(self.by_time) * self.spans + self._sizes(largest.T))
 
+    def beside(self, state: np.ndarray) -> np.ndarray:
+        """Sizes (surfaces,) well above arguments' rounding, added to their events next to their zeros, at the
+        only state (states,).
+        """
+        noise = np.maximum(self.noises(state)[:, 0], _LEAST * self.epsilon)
+        return np.asarray(2 * np.abs(self.u[:, 0]) + noise)
+
     @cached_property
     def rate_noises(self) -> np.ndarray:
         """The same of rates."""
@@ -78,31 +85,28 @@ class SurfaceFunctions:
         self.clocked = system.clocked
         named = [hy.par[self.parameters - 1], hy.time]  # functions without them take no such argument
         variables, fields = system.variables, [right for _, right in system.equations]
-        by_time, gradients, rates, changes = [], [], [], []
+        by_time, gradients, rates = [], [], []
         for u in system.surfaces:
             explicit, by_state = slopes(u)
             along = [by_state.get(name, hy.expression(0.0)) for name in system.states]
             by_time += explicit or [hy.expression(0.0)]
             gradients += along
             rates.append(hy.sum([*explicit, *(a * b for a, b in zip(along, fields, strict=True))]))
-            terms = [slope * hy.make_vars(name) for name, slope in by_state.items()]
-            terms += [slope * hy.time for slope in explicit]
-            changes.append(hy.sqrt(hy.sum([term * term for term in terms])))
         spin = [hy.sum([w * w for w in system.mechanics.rates])] if self.unturned else []
         found = [c.expression for c in system.crossings]
         sizes = [[g * g for g in slopes(expression)[1].values()] for expression in found]
         lengths = [hy.sqrt(hy.sum(squares)) if squares else hy.expression(0.0) for squares in sizes]
-        often = [*system.turning, *system.signed, *spin], [*found, *lengths], [*system.surfaces, *changes]
-        self._ends = np.cumsum([len(part) for part in often]).tolist()
+        turning = [*system.turning, *system.signed, *spin]
+        self._first = len(turning)
         outputs = [*system.surfaces, *by_time, *rates, *gradients, *fields, *named]
         self._often, self._everything = (
             compiled_function(given, variables, compact_mode=True, **precision.options)
-            for given in ([*often[0], *often[1], *often[2], *named], outputs)
+            for given in ([*turning, *found, *lengths, *named], outputs)
         )
 
     def _turned(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> list[float]:
         found = self._often(np.array(state), pars=pars, time=time)
-        return [float(x) for x in found[: self._ends[0]]]
+        return [float(x) for x in found[: self._first]]
 
     def plain(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> tuple[list[float], list[float]]:
         """The plain angles, and the plain quaternion, where turns are continued."""
@@ -117,15 +121,9 @@ class SurfaceFunctions:
         """Values of the events' expressions at many states, and the effect on them of rounding in states of
         order one, (2, events, n).
         """
-        found = _by_columns(self._often, states, times, pars)[self._ends[0] : self._ends[1]]
+        found = _by_columns(self._often, states, times, pars)[self._first : -2]
         values, sizes = np.split(found, 2)
         return np.array([values, _RATE_ROUNDINGS * self._epsilon * sizes])
-
-    def beside(self, state: np.ndarray, time: Scalar, pars: np.ndarray, j: int) -> float:
-        """A size well above an argument's rounding, which is added to its event next to its zero."""
-        found, place = self._often(state, pars=pars, time=time), self._ends[1] + j
-        noise = max(_ROUNDINGS * float(found[place + self._surfaces]), _LEAST)
-        return 2 * abs(float(found[place])) + self._epsilon * noise
 
     def looks(self, states: np.ndarray, times: np.ndarray, pars: np.ndarray) -> SurfaceValues:
         """Surfaces and fields at many states (n, states), times (n,) and parameters (n, parameters)."""

@@ -199,31 +199,21 @@ class SwitchingStepper(TaylorStepper):
     # --- engines --------------------------------------------------------------------------------------------
 
     def _compiled(self, system: System) -> TaylorEngine:
-        options, equations, along = dict(self.precision.options), system.equations, self._along
+        equations, along, more = system.equations, self._along, dict[str, Any]()
         outwards = [hy.par[j] * u + hy.par[system.parameters + j] for j, u in enumerate(system.surfaces)]
         arguments = enumerate(of_order_one(system, outwards, system.surfaces))
         ends = [self._event(u, j) for j, u in arguments if self._free[j] and j not in along]
         noted = []
         if along:
             found = sliding(system, along)
-            equations = found.equations
+            equations, more = found.equations, {"compact_mode": True} if len(along) > 1 else {}
             for j, side in zip(along, found.sides, strict=True):
                 ends.append(self._event(side - 1.0, j, 1, hy.event_direction.positive))
                 ends.append(self._event(side + 1.0, j, -1, hy.event_direction.negative))
         if self.has_events:
             offsets = system.parameters + len(system.surfaces)
             noted = engine_events(system, self.precision, self.log, offsets=offsets)
-        if self._tolerance is not None:
-            options["tol"] = self._tolerance
-        return hy.taylor_adaptive(
-            equations,
-            self.precision.array(system.initial),
-            time=self._start,
-            t_events=ends,
-            nt_events=noted,
-            compact_mode=self.precision.compact or system.wide or len(along) > 1,
-            **options,
-        )
+        return self._engine_of(system, equations, t_events=ends, nt_events=noted, **more)
 
     def _event(
         self, u: hy.expression, j: int, end: int = 0, way: hy.event_direction = hy.event_direction.negative
@@ -306,11 +296,11 @@ class SwitchingStepper(TaylorStepper):
         engine, pars = self._integrator, self._parameters()
         look = self._functions.look(self.state, self.time, pars)
         # the change of the state in a unit of time shows its size
-        noises, moved = look.noises(self.state, look.field.T)[:, 0], self._usual[: len(self._modes)]
+        near = np.abs(look.u) <= look.noises(self.state, look.field.T)
+        moved, beside = self._usual[: len(self._modes)], look.beside(self.state)
         for j in np.flatnonzero(self._free).tolist():
-            near = abs(look.u[j, 0]) <= noises[j] or j + 1 == self._crossed
-            if near and j + 1 != -self._crossed:
-                moved[j] = self._functions.beside(self.state, self.time, pars, j)
+            if (near[j, 0] or j + 1 == self._crossed) and j + 1 != -self._crossed:
+                moved[j] = float(beside[j])
         for j in muted:
             moved[j] = _FAR_OFF
         if self.has_events:
