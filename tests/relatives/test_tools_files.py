@@ -2,6 +2,7 @@
 SciPy's of a free body.
 """
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -207,6 +208,22 @@ def test_a_late_clock_is_found(seed: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.unoptimised
+@pytest.mark.parametrize("seed", seeds(1, 30))
+def test_a_start_elsewhere_is_shown_as_keys(seed: int) -> None:
+    motion = Motion(np.random.default_rng(seed))
+    given = {"t": motion.times, "q": motion.attitude.as_quat()} | ({"w": motion.rates} if seed % 2 else {})
+    other = rigidsim.parse(motion.text(), overrides=["initial.quaternion=[1, 0, 0, 0]"])
+    known = {"order": "xyzw", "direction": "body_to_space", "offset": "none"}
+    with unoptimised_code():
+        found = rigidsim.compare(other, given, convention=known)
+    assert found.verdict == "undecided"
+    [note] = [one for one in found.told if "near the experiment's start" in one]
+    q, w = (np.fromstring(x, sep=",") for x in re.findall(r"\[(.*?)\]", note))
+    assert (Rotation.from_quat(np.roll(q, -1)).inv() * motion.start).magnitude() < 1e-8
+    assert np.abs(w - motion.rates_begun).max() < (1e-8 if seed % 2 else 0.01)
+    assert note.endswith("roughly") != bool(seed % 2)
+
+
 def test_an_experiments_own_times_are_no_unix_time() -> None:
     motion = Motion(np.random.default_rng(3))
     text = motion.text().replace("end = 8.0", "start = 1700000000\nend = 1700000008")

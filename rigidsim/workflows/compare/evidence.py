@@ -14,7 +14,7 @@ import numpy as np
 import xarray
 
 from rigidsim.accuracy.comparison import parts_of, rotation_vectors
-from rigidsim.scene.rotations import angles_between, normalised
+from rigidsim.scene.rotations import angles_between, conjugated, multiplied, normalised, vector_of
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.from_states import FromStates, NotFromStates, RowStates
 from rigidsim.workflows.compare import defects
@@ -351,6 +351,20 @@ def _contradiction(seen: Evidence, windows: defects.WindowDefects) -> Verdict | 
     )
 
 
+def _start_of(seen: Evidence) -> str:
+    """The trajectory's own start as keys of a config; rates by extrapolated turns where it has none."""
+    at, near = seen.begin, slice(seen.begin, seen.begin + 3)
+    if seen.rates is not None:
+        rates = seen.rates[at]
+    else:
+        rows = seen.quaternions[near]
+        turns = vector_of(multiplied(conjugated(rows[:-1]), rows[1:])) / np.diff(seen.times[near])[:, None]
+        rates = turns[0] + (turns[0] - turns[-1]) / 2 if len(turns) else np.zeros(3)
+    start = [", ".join(f"{x:.9g}" for x in values) for values in (seen.quaternions[at], rates)]
+    words = f"near the experiment's start it has quaternion = [{start[0]}], angular_velocity = [{start[1]}]"
+    return words if seen.rates is not None else f"{words}, roughly"
+
+
 def _elsewhere(seen: Evidence, gap: float, attitude: float, rates: float, length: float) -> Verdict | None:
     """The verdict on another start, which outweighs defects (rad, rad/s) over windows of a length (s)."""
     angle, floor = float(seen.errors[seen.begin]), seen.floor[0]
@@ -361,6 +375,7 @@ def _elsewhere(seen: Evidence, gap: float, attitude: float, rates: float, length
     if angle + gap * seen.span <= _START * collected:
         return None
     apart = f"{angle:.3g} rad and {gap:.3g} rad/s apart"
+    seen.notes.append(_start_of(seen))
     return UNDECIDED, f"it starts elsewhere, {apart}, which outweighs what its equations miss on the way"
 
 

@@ -348,7 +348,8 @@ def search(
     if size > _FAR:
         notes.append(
             f"residuals are {size:.3g} sigmas: the fit ended in another minimum, a load is missing, or the "
-            "sigmas are too small; begin near the first row's attitude and rates, or try more starts"
+            "sigmas are too small; begin near the first row's attitude and rates (compare shows them), or "
+            "try more starts"
         )
     return ended, costs, notes
 
