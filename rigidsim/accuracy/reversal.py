@@ -12,13 +12,13 @@ import numpy as np
 
 from rigidsim.accuracy.comparison import Collected, angles_between, distances_between
 from rigidsim.accuracy.estimates import estimate_errors
-from rigidsim.errors import ConfigError, Problem, RigidsimError
+from rigidsim.errors import ConfigError, Problem, RigidsimError, required
 from rigidsim.model.load import Load
 from rigidsim.model.system import System
 from rigidsim.scene.choices import variables_named
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.sample_times import SampleTimes
-from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.scene.scene import FROM_BEHIND, Scene, build_scene
 from rigidsim.solve.problem import InitialValueProblem, prepare_scene
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
@@ -92,6 +92,8 @@ def there_and_back(experiment: Experiment, loads: Sequence[Load] = (), *, compac
         raise ConfigError(Problem("[integrator]", "the motion has neither an attitude nor rates to compare"))
     quiet = experiment.quiet(names)
     scene = build_scene(quiet)
+    for impulse in (required(event.impulse) for event in scene.impulses if event.time is None):
+        raise impulse.fault("expression", FROM_BEHIND)
     scene = _between(scene, scene.start, scene.samples.last)
     there = prepare_scene(quiet, scene, loads=loads)
     there = replace(there, precision=replace(there.precision, compact=compact or there.precision.compact))

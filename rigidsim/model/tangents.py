@@ -146,6 +146,8 @@ def _absent(m: Mechanics) -> str | None:
         return 'without an orbit nothing in a plane keeps the steps short; choose formulation = "quaternion"'
     if m.piecewise:
         return "at rows of a table or edges of blocks states are set, where variational equations end"
+    if m.scene.impulses:
+        return f"at the impulse {m.scene.impulses[0].name} velocities change at once"
     if integrator.precision == "single":
         return "single precision can't hold a vector that small; choose double"
     if m.surfaces.found:

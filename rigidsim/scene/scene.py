@@ -351,6 +351,12 @@ def _resolved_events(setting: Setting) -> tuple[Event, ...]:
     return tuple(found)
 
 
+FROM_BEHIND = (
+    "given for an impulse, whose root can't be found from behind, after what it changed; give time in its "
+    "place, or go forwards"
+)
+
+
 def _impulse(table: EventTable, event: Event, here: Setting) -> Impulse:
     context, names = here.context, [one.name for one in here.config.rigid_bodies]
     if table.body not in (None, *names):
@@ -359,12 +365,9 @@ def _impulse(table: EventTable, event: Event, here: Setting) -> Impulse:
     moves = here.free_flight or bool(names)
     what = "given, but [body] has no place; give [initial] position or velocity, or change angular_velocity"
     ensure(table.velocity is None or moves, here.fault("velocity", what))
-    if event.time is None:
-        what = (
-            "can't be found from behind, after what it changed; give time in its place, or end the run later"
-        )
-        ensure(here.end >= here.start, here.fault("expression", f'given "{table.expression}", which {what}'))
-    elif event.time == here.start:
+    if event.time is None and here.end < here.start:
+        raise here.fault("expression", FROM_BEHIND)
+    if event.time == here.start:
         what = f"is the start ({context.nstr(event.time, 6)} s); let it begin with other velocities instead"
         raise here.fault("time" if table.time else "expression", what)
     velocity, rates, momentum = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -32,10 +32,12 @@ class Impulses:
     def after(self, time: Scalar) -> Due | None:
         """The next one of a given time after a time; None after the last."""
         place = bisect_right(self._times, time)
-        if place == len(self._times):
-            return None
-        last = bisect_right(self._times, self._times[place])
-        return Due(self._times[place], [kick.index for kick in self._events[place:last]])
+        return self.at(self._times[place]) if place < len(self._times) else None
+
+    def at(self, time: Scalar) -> Due | None:
+        """The one of a given time that is exactly a time."""
+        events = self._events[bisect_left(self._times, time) : bisect_right(self._times, time)]
+        return Due(time, [kick.index for kick in events]) if events else None
 
     def changed(self, system: System, due: Due, state: np.ndarray) -> np.ndarray:
         """A state (states,) of the system, or of its partner, after a change."""

@@ -281,9 +281,11 @@ def _check_tolerance(tolerance: mpmath.mpf, precision: Precision) -> None:
 def _refuse_spectrum(system: System) -> None:
     """Refuse a Lyapunov spectrum where variational equations end: at switches, and rows of tables."""
     found = system.plan.surfaces.found
-    if not system.scene.config.output.lyapunov or (not found and system.pieces is None):
+    if not system.scene.config.output.lyapunov or not (found or system.pieces or system.kicks):
         return
     why, instead = "states are set at the edges of a table or kernel", "give orbits by elements"
+    if system.kicks:
+        why, instead = "an impulse changes velocities at once", "remove the impulse"
     if found:
         why = f"the equations switch at a kink or jump of {found[0].text} ({found[0].where})"
         instead = found[0].remedy

@@ -80,7 +80,7 @@ class SamplesWithin:
 
     def back_to(self, count: int) -> None:
         """Forget all but the first."""
-        self.states = self.states[:count]
+        self.states = list(self.states[:count])
         self.ended = False
 
 

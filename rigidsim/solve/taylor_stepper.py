@@ -87,7 +87,12 @@ class TaylorStepper(Stepper):
             self._bounds[self._chart] = self._longest = self.precision.of_double(bound)
 
     def settle(self) -> None:
-        """Must be called after the state was set from outside."""
+        """Must be called after the state was set from outside, to one before what acts there."""
+        self._due = self._impulses.at(self.time)
+        self._take_sides()
+
+    def _take_sides(self) -> None:
+        """Continue on the sides of surfaces on which the state lies."""
 
     def _compiled(self, system: System) -> TaylorEngine:
         noted = engine_events(system, self.precision, self.log, start=self._start) if self.has_events else []
@@ -168,7 +173,7 @@ class TaylorStepper(Stepper):
             system = self._system_of(self._chart)
             self._integrator.state[:] = self._impulses.changed(system, self._due, self._integrator.state)
             self._due = None
-            self.settle()
+            self._take_sides()
         self._earlier, self._coming = None, self._impulses.after(self.time)
 
     @property
@@ -261,10 +266,8 @@ class TaylorStepper(Stepper):
             self._hold(samples)
             smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
             if (
-                self._due is not None
-                or end is None
-                or end == self.until
-                or self.time != end
+                ((end is None or self.time != end) and self._due is None)
+                or self.time == self.until
                 or self.steps >= last
             ):
                 break

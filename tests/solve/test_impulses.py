@@ -78,7 +78,7 @@ def test_random_impulses(seed: int) -> None:
     rates, own_formulation = random.normal(size=3), FORMULATIONS[seed % 3]
     axes = random.choice(["space", "body", "rtn"], 2).tolist()
     times = np.sort(random.uniform(0.5, 8.5, 2))
-    times[0] = np.round(times[0] * 4) / 4  # at a row, which is before it
+    times[0] = np.floor(times[0] * 4) / 4  # at a row, which is before it
     pushes, spin = 0.1 * random.normal(size=(3, 3)), random.normal(size=3)
     text = event(
         "one", time=times[0], axes=axes[0], velocity=pushes[0].tolist(), angular_velocity=spin.tolist()
@@ -102,9 +102,11 @@ def test_random_impulses(seed: int) -> None:
             own.kick(axes[which], pushes[which], spin * (1, 2)[which])
     how = f'formulation = "{own_formulation}"'
     data = loaded(run_text(scene(state, rates, text + far, integrator=how)))
-    np.testing.assert_allclose(np.c_[data.position, data.velocity], np.array(rows), rtol=0, atol=2e-10)
+    np.testing.assert_allclose(
+        np.c_[data.position, data.velocity], np.array(rows), rtol=0, atol=3e-9
+    )  # by its interpolant
     np.testing.assert_allclose(data.angular_velocity[-1], own.rates, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(data.far_time, apart, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(data.far_time, apart, rtol=0, atol=3e-9)
     assert data.one_time.values.tolist() == [times[0]]
     there = loaded(run_text(scene(state, rates, text, integrator=how)))
     end = there.isel(time=-1)
@@ -136,7 +138,7 @@ def test_resumed_has_the_same_bits(case: tuple[str, str], tmp_path: Path) -> Non
     text = text if kind == "roots" else text.replace("[[loads]]", f"[[loads]]\n{SWITCHED}\n[[loads]]", 1)
     given = f"integrator.precision='{precision}'"
     whole = run_text(text, given)
-    for part in (2, 4, 5, 7):
+    for part in (3, 6):
         steps = f"limits.max_steps={part * whole.summary['cost']['steps'] // 8}"
         run_text(text, given, steps, tmp_path / str(part))
         done = rigidsim.resume(tmp_path / str(part) / "scene", overrides=["limits.max_steps=100000"])
@@ -186,6 +188,8 @@ def test_announced_errors_are_those_of_80_bits() -> None:
             'body: given "moon"; there are no [[rigid_b',
         ),
         (event("a", time=0, velocity=[1, 0, 0]), {}, "number 1 time: is the start (0.0 s); let it begin"),
+        (PUSHES, {"output": "lyapunov = true"}, "an impulse changes velocities at once, where variational"),
+        (PUSHES, {"output": 'record = ["tangent_growth"]'}, "at the impulse push velocities change at once"),
         (FAR, {"time": "end = -9\nsamples = 2"}, "can't be found from behind"),
         (PUSHES, {"integrator": 'method = "closed_form"'}, "the impulse push has no closed form"),
         (

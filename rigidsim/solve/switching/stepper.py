@@ -188,8 +188,7 @@ class SwitchingStepper(TaylorStepper):
             raise ValueError(f"the checkpoint remembers {sides.shape} numbers of switching surfaces")
         return super().unpack(arrays), tuple(sides.tolist())
 
-    def settle(self) -> None:
-        """Must be called after the state was set from outside: takes the sides on which it lies."""
+    def _take_sides(self) -> None:
         # the state lies next to surfaces that it slid along
         self._modes = [mode or 1 for mode in self._modes]
         self._take_known_sides()
