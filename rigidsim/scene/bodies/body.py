@@ -848,10 +848,13 @@ def _check_moments(context: Any, moments: Vector, where: str) -> None:
     """Refuse principal moments that no mass has."""
     given = f"principal moments {', '.join(context.nstr(m, 12) for m in moments)}: "
     small, middle, large = sorted(moments)
-    ensure(small >= 0, refusal(where, f"{given}a moment of inertia can't be negative"))
-    ensure(middle != 0 or large == 0, refusal(where, f"{given}at most one can be zero (a rod's)"))
+    ensure(small >= 0, refusal(where, f"{given}a moment of inertia can't be negative: correct it"))
+    ensure(
+        middle != 0 or large == 0,
+        refusal(where, f"{given}at most one can be zero (a rod's): give the others"),
+    )
     what = f"{given}the largest is more than the sum of the other two by "
-    what += f"{context.nstr(large - small - middle, 6)}, which no mass distribution allows (I1 + I2 >= I3)"
+    what += f"{context.nstr(large - small - middle, 6)}, which no mass has (I1 + I2 >= I3): correct one"
     ensure(small + middle >= large - large * context.mpf(_ROUNDING_OF_INPUT), refusal(where, what))
 
 
