@@ -111,16 +111,16 @@ def _drawn(vertices: np.ndarray, faces: np.ndarray, radius: float) -> tuple[list
     many triangles.
     """
     for cells in (_GRID, *(2**k for k in range(8, 1, -1)), 3, 2, 1):  # across the radius
-        _, cell, counts = np.unique(
-            np.round(vertices * (cells / radius)), axis=0, return_inverse=True, return_counts=True
-        )
+        rounded = np.round(vertices * (cells / radius)).astype(np.int64)
+        _, cell, counts = np.unique(rounded, axis=0, return_inverse=True, return_counts=True)
         named = cell.reshape(-1)[faces]
         named = named[(named != np.roll(named, 1, axis=1)).all(axis=1)]
         if len(named) <= _DRAWN:
             break
     sums = np.stack([np.bincount(cell.reshape(-1), x) for x in vertices.T], axis=1)
     places = np.round(sums / counts[:, None] * (_GRID / radius)).astype("<i2")
-    tables = {"vertices": places, "triangles": named.astype("<u2")}
+    used, numbers = np.unique(named, return_inverse=True)
+    tables = {"vertices": places[used], "triangles": numbers.astype("<u2")}
     return [f'{k} = "{b64encode(x.tobytes()).decode()}"' for k, x in tables.items()], len(named)
 
 
