@@ -561,8 +561,9 @@ class TablePieces(PieceSeries):
         parameters, states = [inverse], [np.full(len(pieces), self._back)]
         for element in self._place.elements(orbit):
             scale, c = 1 / np.longdouble(float(_unit(orbit, element))), found[element]
-            parameters += [power * c[:, power] * inverse * scale for power in range(1, _POWERS + 1)]
-            states.append((c.sum(axis=1) if self._back else c[:, 0]) * scale)
+            steps = [power * c[power] * inverse for power in range(1, _POWERS + 1)]
+            parameters += steps if scale == 1 else [step * scale for step in steps]
+            states.append((sum(c) if self._back else c[0]) * scale)
         rows = np.array(parameters).T
         rows[np.abs(rows) <= np.longdouble(2) ** (_LEAST * bits_in_use(orbit.context))] = 0
         return rows.astype(kind), np.array(states).T.astype(kind)

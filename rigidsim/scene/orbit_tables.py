@@ -69,12 +69,12 @@ class Interpolation:
         self.lengths, self.values = lengths, values
         self._even = bool((lengths == lengths[:1]).all())
 
-    def pieces(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of pieces (n,) lengths (n,), and coefficients (n, 6, columns) of the powers of
-        (t - t_i) / (t_{i+1} - t_i). Floats must not grow beyond order one.
+    def pieces(self, begin: int, end: int) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Of pieces begin ... end-1 lengths (n,), and the coefficients (n, columns) of the powers 0 to 5
+        of (t - t_i) / (t_{i+1} - t_i). Floats must not grow beyond order one.
         """
         lengths, values, count = self.lengths, self.values, min(NEAREST, len(self.values))
-        rows, ends = np.unique(np.stack([numbers, numbers + 1]), return_inverse=True)
+        rows = np.arange(begin, end + 1)
         first = np.clip(rows - count // 2, 0, len(values) - count)
         near, here = first[:, None] + np.arange(count), rows - first
         # rows at equal distances have equal weights, but near the table's ends
@@ -86,14 +86,13 @@ class Interpolation:
         place = here[alike, None]
         offsets = offsets - np.take_along_axis(offsets, place, axis=1)
         around = values[near]
-        d, s = (np.einsum("ni,nic->nc", w[same], around)[ends] for w in _weights(offsets, place))
-        length = lengths[numbers]
-        y0, y1, step = values[numbers], values[numbers + 1], length[:, None]
-        a, b = d[0] * step, s[0] * step * step / 2
+        d, s = (np.einsum("ni,nic->nc", w[same], around) for w in _weights(offsets, place))
+        length = lengths[begin:end]
+        y, step = values[begin : end + 1], length[:, None]
+        a, b = d[:-1] * step, s[:-1] * step * step / 2
         # remainder at the far end for the powers 3 to 5: value, derivative, and half the second derivative
-        u, v, w = y1 - (y0 + a + b), d[1] * step - (a + b * 2), s[1] * step * step / 2 - b
-        powers = [y0, a, b, u * 10 - v * 4 + w, v * 7 - u * 15 - w * 2, u * 6 - v * 3 + w]
-        return length, np.stack(powers, axis=1)
+        u, v, w = y[1:] - (y[:-1] + a + b), d[1:] * step - (a + b * 2), s[1:] * step * step / 2 - b
+        return length, [y[:-1], a, b, u * 10 - v * 4 + w, v * 7 - u * 15 - w * 2, u * 6 - v * 3 + w]
 
 
 def in_80_bits(exact: np.ndarray) -> np.ndarray:
@@ -127,9 +126,8 @@ def left_out(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndar
     """Every other row's number, and values (rows, columns) interpolated there from the others, in float64."""
     kept = Interpolation(np.diff(times[::2]), values[::2])
     rows = np.arange(1, 2 * len(kept.values) - 2, 2)
-    lengths, parts = kept.pieces(rows // 2)
+    lengths, c = kept.pieces(0, len(kept.lengths))
     x = ((times[rows] - times[rows - 1]) / lengths)[:, None]
-    c = np.moveaxis(parts, 1, 0)
     return rows, ((((c[5] * x + c[4]) * x + c[3]) * x + c[2]) * x + c[1]) * x + c[0]
 
 
@@ -531,17 +529,20 @@ class TabulatedOrbit:
     def piece(self, number: int) -> dict[str, list[Any]]:
         """For each changing element, the coefficients of the powers 0 to 5 of (t - t_i) / (t_{i+1} - t_i)."""
         if number not in self._pieces:
-            _, coefficients = self._interpolation.pieces(np.array([number]))
-            columns = coefficients[0].T
+            _, powers = self._interpolation.pieces(number, number + 1)
             self._pieces[number] = {
-                name: list(map(self.context.convert, c)) for name, c in zip(self.moving, columns, strict=True)
+                name: [self.context.convert(c[0, i]) for c in powers] for i, name in enumerate(self.moving)
             }
         return self._pieces[number]
 
-    def narrow_pieces(self, numbers: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        """Of many pieces in 80 bits: lengths (n,), s, and for each changing element coefficients (n, 6)."""
-        lengths, found = self._narrow.pieces(numbers)
-        return lengths, {name: found[:, :, i] for i, name in enumerate(self.moving)}
+    def narrow_pieces(self, numbers: np.ndarray) -> tuple[np.ndarray, dict[str, list[np.ndarray]]]:
+        """Of neighbouring pieces in 80 bits: lengths (n,), s, and for each changing element the coefficients
+        (n,) of the powers 0 to 5.
+        """
+        begin = int(numbers.min())
+        lengths, powers = self._narrow.pieces(begin, int(numbers.max()) + 1)
+        picked = numbers - begin
+        return lengths[picked], {name: [c[picked, i] for c in powers] for i, name in enumerate(self.moving)}
 
     @cached_property
     def _narrow(self) -> Interpolation:
