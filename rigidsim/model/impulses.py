@@ -19,7 +19,7 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic, along, unit
 from rigidsim.model.rotations import apply as turned
 from rigidsim.model.state_blocks import BODY
-from rigidsim.scene.arithmetic import Vector, apply, cross
+from rigidsim.scene.arithmetic import apply, cross
 from rigidsim.scene.bodies.body import inverse_inertia
 from rigidsim.scene.scene import Impulse
 
@@ -45,8 +45,8 @@ class _Moving:
 
     moved: Sequence[str]
     spun: Sequence[str]
-    place: Sequence[Symbolic] | None
-    velocity: Sequence[Symbolic] | None
+    place: list[Symbolic] | None
+    velocity: list[Symbolic] | None
     speed: int
     rates: Sequence[Symbolic]
     turning: Sequence[int]
@@ -89,10 +89,9 @@ def _pushed(m: Mechanics, impulse: Impulse) -> dict[str, Symbolic]:
     """States of a velocity after an impulse."""
     if impulse.velocity is None:
         return {}
-    moving, context, axes = _moving(m, impulse), m.scene.context, impulse.axes
-    back = m.scaling.direction < 0
+    moving, axes = _moving(m, impulse), impulse.axes
     sign = moving.sign * m.scaling.direction
-    change = [m.number(context.ldexp(sign * x, -moving.speed)) for x in impulse.velocity]
+    change = [m.scaled(sign * x, -moving.speed) for x in impulse.velocity]
     place, velocity = m.carried(moving.place), m.carried(moving.velocity)
     if axes == "body":
         change = turned(moving.matrix, change)
@@ -100,7 +99,7 @@ def _pushed(m: Mechanics, impulse: Impulse) -> dict[str, Symbolic]:
         outwards = unit(place)
         across = [v - along(outwards, velocity) * u for u, v in zip(outwards, velocity, strict=True)]
         ahead = unit(across)
-        if back and impulse.velocity[2] != 0:
+        if m.scaling.direction < 0 and impulse.velocity[2] != 0:
             square, aside = along(across, across), change[2]
             size = hy.sqrt(square - aside * aside)
             beyond = cross(outwards, across)
@@ -112,20 +111,18 @@ def _pushed(m: Mechanics, impulse: Impulse) -> dict[str, Symbolic]:
 
 def _turned(m: Mechanics, impulse: Impulse) -> dict[str, Symbolic]:
     """States of the angular velocity after an impulse."""
-    key = "angular_impulse" if impulse.rates is None else "angular_velocity"
-    change: Vector | None = impulse.rates
-    moving, context = _moving(m, impulse), m.scene.context
+    moving, change = _moving(m, impulse), impulse.rates
     if impulse.momentum is not None:
-        what = "given for a body whose tensor of inertia changes; give the change of angular_velocity instead"
-        ensure(impulse.body or m.shape is None, impulse.fault(key, what))
+        what = "given for a body with rotors, or whose tensor of inertia changes; give the change of "
+        rigid = m.shape is None and all(x.loose for x in m.carriers)
+        ensure(impulse.body or rigid, impulse.fault("angular_impulse", f"{what}angular_velocity instead"))
         change = apply(moving.inverse, impulse.momentum)
     if change is None:
         return {}
-    states = {str(name) for name in m.rate_states}
     what = "given, but these states hold no angular velocity; "
     what += 'choose formulation = "quaternion", or a body without changes of shape'
-    kept = impulse.body or (states == {*BODY.rates} and m.rate_correction is None)
-    ensure(kept, impulse.fault(key, what))
-    sign = m.scaling.direction
+    kept = {str(name) for name in m.rate_states} == {*BODY.rates} and m.rate_correction is None
+    ensure(impulse.body or kept, impulse.fault("angular_velocity", what))
     pairs = zip(moving.spun, moving.rates, change, moving.turning, strict=True)
-    return {name: w + m.number(context.ldexp(sign * x, -e)) for name, w, x, e in pairs if x != 0}
+    size = m.scaling.direction
+    return {name: w + m.scaled(size * x, -e) for name, w, x, e in pairs if x != 0}

@@ -411,9 +411,9 @@ class System:
         for event in self.scene.events:
             (expression,) = written(m, [event.expression], clocked=False)
             direction = self.scaling.direction * _DIRECTIONS[event.direction]
+            one = Crossing(event.name, expression, direction, event.stop)
             kicks, known = event.impulse is not None, event.time is not None
-            kinds = {"kicks": kicks and not known, "known": kicks and known}
-            found.append(Crossing(event.name, expression, direction, event.stop, **kinds))
+            found.append(replace(one, kicks=kicks and not known, known=kicks and known))
         endings = [(*one, kind) for kind in ENDINGS for load in m.loads for one in ENDINGS[kind](load, m)]
         endings += [
             (f"{expression.where} is negative", above_zero(m, expression), IMPOSSIBLE)

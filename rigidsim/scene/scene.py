@@ -342,12 +342,9 @@ def _resolved_events(setting: Setting) -> tuple[Event, ...]:
             raise here.fault("expression", what)
         line = as_line(expression, setting.context)
         rises = {"any": 0, "up": 1, "down": -1}[table.direction]
-        once = line is not None and line.slope * rises >= 0
-        event = Event(table.name, expression, table.direction, table.action == "stop")
-        event = replace(event, time=line.zero) if once else event
-        found.append(
-            replace(event, impulse=_impulse(table, event, here)) if table.action == "impulse" else event
-        )
+        time = line.zero if line is not None and line.slope * rises >= 0 else None
+        impulse = _impulse(table, time, here) if table.action == "impulse" else None
+        found.append(Event(table.name, expression, table.direction, table.action == "stop", time, impulse))
     return tuple(found)
 
 
@@ -357,7 +354,7 @@ FROM_BEHIND = (
 )
 
 
-def _impulse(table: EventTable, event: Event, here: Setting) -> Impulse:
+def _impulse(table: EventTable, time: Any, here: Setting) -> Impulse:
     context, names = here.context, [one.name for one in here.config.rigid_bodies]
     if table.body not in (None, *names):
         allowed = f"allowed: {', '.join(names)}" if names else "there are no [[rigid_bodies]]"
@@ -365,10 +362,10 @@ def _impulse(table: EventTable, event: Event, here: Setting) -> Impulse:
     moves = here.free_flight or bool(names)
     what = "given, but [body] has no place; give [initial] position or velocity, or change angular_velocity"
     ensure(table.velocity is None or moves, here.fault("velocity", what))
-    if event.time is None and here.end < here.start:
+    if time is None and here.end < here.start:
         raise here.fault("expression", FROM_BEHIND)
-    if event.time == here.start:
-        what = f"is the start ({context.nstr(event.time, 6)} s); let it begin with other velocities instead"
+    if time == here.start:
+        what = f"is the start ({context.nstr(time, 6)} s); let it begin with other velocities instead"
         raise here.fault("time" if table.time else "expression", what)
     velocity, rates, momentum = (
         None if given is None else vector(context, given)

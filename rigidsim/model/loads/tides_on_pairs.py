@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import heyoka as hy
 
@@ -29,8 +29,7 @@ from rigidsim.scene.bodies.body import RigidBody
 from rigidsim.scene.scene import Scene
 
 
-@dataclass(frozen=True)
-class Second:
+class Second(NamedTuple):
     """A second body's states in the units whose binary exponents (SI) are given."""
 
     names: RotatingBody
@@ -40,16 +39,6 @@ class Second:
     matrix: list[list[Symbolic]]
     far: int
     speed: int
-
-    def seen_by(self, m: Kinematics) -> Kinematics:
-        """The kinematics of this body in the place of the first."""
-        context, scaling = m.scene.context, m.scaling
-        inertia = [[context.ldexp(x, -scaling.inertia) for x in row] for row in self.body.inertia]
-        turned = AttitudeStates(
-            self.names.quaternion, [], [], self.matrix, self.quaternion, quaternion_sign="state"
-        )
-        numbers, scene = replace(m.numbers, inertia=inertia), replace(m.scene, body=self.body)
-        return replace(m, scene=scene, numbers=numbers, attitude=turned, body=self.names)
 
 
 @dataclass(frozen=True)
@@ -100,13 +89,24 @@ def _tide(load: Attraction, second: Second, m: Kinematics) -> Tides:
     falling = [size * (x + beyond * u) for x, u in zip(part, towards, strict=True)]
     away = 1.0 / hy.sqrt(1.0 + q)
     line = [away * (u - x) for x, u in zip(part, towards, strict=True)]
-    own = second.seen_by(m)
+    own = _seen_from(second, m)
     other = replace(load, placement=_Known(SourcePlace(line, inverse * away, there.unit)))
     figures = _figure(other, own, second), _figure(load, m, second)
     return Tides(
         [a + b - c for a, b, c in zip(falling, *figures, strict=True)],
         other.torque(own),
     )
+
+
+def _seen_from(second: Second, m: Kinematics) -> Kinematics:
+    """The kinematics of the second body in the place of the first."""
+    context, names = m.scene.context, second.names
+    inertia = [[context.ldexp(x, -m.scaling.inertia) for x in row] for row in second.body.inertia]
+    turned = AttitudeStates(
+        names.quaternion, [], [], second.matrix, second.quaternion, quaternion_sign="state"
+    )
+    numbers, scene = replace(m.numbers, inertia=inertia), replace(m.scene, body=second.body)
+    return replace(m, scene=scene, numbers=numbers, attitude=turned, body=names)
 
 
 def _figure(load: Attraction, m: Kinematics, second: Second) -> Sequence[Symbolic]:
