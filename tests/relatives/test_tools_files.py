@@ -206,8 +206,6 @@ def test_a_late_clock_is_found(seed: int) -> None:
         assert known.attitude_error.largest < 1e-8
 
 
-@pytest.mark.slow
-@pytest.mark.unoptimised
 @pytest.mark.parametrize("seed", seeds(1, 30))
 def test_a_start_elsewhere_is_shown_as_keys(seed: int) -> None:
     motion = Motion(np.random.default_rng(seed))
@@ -224,6 +222,8 @@ def test_a_start_elsewhere_is_shown_as_keys(seed: int) -> None:
     assert note.endswith("roughly") != bool(seed % 2)
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_an_experiments_own_times_are_no_unix_time() -> None:
     motion = Motion(np.random.default_rng(3))
     text = motion.text().replace("end = 8.0", "start = 1700000000\nend = 1700000008")
