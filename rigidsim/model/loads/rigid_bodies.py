@@ -708,12 +708,8 @@ class MutualGravity(Load):
     Fields = MutualGravityFields
     title = "mutual_gravity"
     conservative = True
+    wide = True  # unrolled it takes 10 to 60 s to compile, and its steps are hardly faster
     reads = frozenset({"attitude"})
-
-    @property
-    def wide(self) -> bool:  # type: ignore[override]
-        """Unrolled, degree 4 takes a minute to compile, and its steps are hardly faster."""
-        return self.degree >= _BOTH_FIGURES
 
     @classmethod
     def resolve(cls, fields: MutualGravityFields, around: Setting) -> MutualGravity:
