@@ -102,7 +102,7 @@ def folder_case(draw: random.Random) -> list[str]:
 def test_no_input_is_written_over(seed: int, made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(made)
     draw = random.Random(seed)
-    for _ in range(5):
+    for _ in range(3):
         line = (file_case if draw.random() < 0.7 else folder_case)(draw)
         if draw.random() < 0.7 and line[0] not in ("plot", "view"):
             line.append("--force")

@@ -55,19 +55,3 @@ def test_the_advice_about_a_damaged_dataset_leads_on(
         xarray.open_dataset("whole/free/dataset.h5", engine="h5netcdf") as whole,
     ):
         assert np.array_equal(again["quaternion"], whole["quaternion"])
-
-
-@pytest.mark.parametrize("seed", seeds(1, 10))
-def test_a_sweep_is_written_again(
-    seed: int, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    shutil.copytree(made / "runs", "runs")
-    whole = Path("runs/swept/dataset.h5").read_bytes()
-    damage(Path("runs/swept/dataset.h5"), random.Random(seed))
-    result = called(["info", "runs/swept"])
-    assert result.exit_code == 2
-    assert "remove it, and rigidsim resume writes it again" in result.stderr
-    Path("runs/swept/dataset.h5").unlink()
-    assert called(["resume", "runs/swept"]).exit_code == 0
-    assert len(Path("runs/swept/dataset.h5").read_bytes()) == len(whole)

@@ -126,7 +126,7 @@ def compared(load: str, times: np.ndarray, end: float, tmp_path: Path, **given: 
     header = "t,q1,q2,q3,q4,wx,wy,wz"
     np.savetxt(tmp_path / "theirs.csv", rows, "%.17g", ",", header=header, comments="")
     experiment = rigidsim.parse(text_of(load, end))
-    return rigidsim.compare(experiment, tmp_path / "theirs.csv", timeline=tmp_path / "both.rrd", force=True)
+    return rigidsim.compare(experiment, tmp_path / "theirs.csv")
 
 
 @pytest.mark.parametrize("case", cases(EVERY, [("free", "before", -6.0)]), ids=str)

@@ -93,11 +93,11 @@ def test_elements_are_those_of_another_integrator(
     for planet in PLANETS:
         table = rows(tmp_path / f"{planet}.csv")
         np.testing.assert_array_equal(table[:, 0], sign * np.arange(-3.0, 6))
-    end = sign * 5 * YEAR
+    end = sign * 2 * YEAR
     late = solve_ivp(slopes, [0, end], start.ravel(), "DOP853", args=(strengths,), rtol=1e-12, atol=1e-14).y[
         :, -1
     ]
-    for moment, row in ((start, 3), (late.reshape(2, 9, 3), 8)):
+    for moment, row in ((start, 3), (late.reshape(2, 9, 3), 5)):
         for body, planet in enumerate(PLANETS, 1):
             got = rows(tmp_path / f"{planet}.csv")[row, 1:]
             known = elements(moment.transpose(1, 0, 2), strengths, body)

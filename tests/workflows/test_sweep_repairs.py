@@ -77,6 +77,18 @@ def test_a_damaged_tile_is_told_with_its_remedy_which_works(out: Path, finished:
     assert same(found, fresh)
 
 
+def test_a_torn_dataset_is_written_again(out: Path, finished: Path) -> None:
+    path = out / "box" / "dataset.h5"
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 3])
+    told = CliRunner().invoke(app, ["info", str(out / "box")])
+    assert told.exit_code == 2
+    assert "remove it, and rigidsim resume writes it again" in told.stderr
+    path.unlink()
+    assert CliRunner().invoke(app, ["resume", str(out / "box")]).exit_code == 0
+    assert len(path.read_bytes()) == len(content)
+
+
 @pytest.mark.slow
 def test_impossible_members_are_marked_where_that_is_asked_and_the_others_run(tmp_path: Path) -> None:
     """The first member and the last exceed I1 + I2 >= I3; what is left is as if it had been swept alone."""

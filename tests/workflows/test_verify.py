@@ -55,7 +55,7 @@ def test_identical_from_the_dataset_alone(original: Path, tmp_path: Path) -> Non
     assert embedded(alone).text == TEXT
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(where=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
 def test_any_flipped_bit_is_known_before_anything_is_read(
     where: float, bit: int, original: Path, tmp_path: Path
@@ -106,7 +106,7 @@ def edited(folder: Path, change: Callable[[dict[str, Any]], Any]) -> None:
 @pytest.fixture(scope="module")
 def complete(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a held run with a timeline, long enough for corrections."""
-    text = TEXT.replace("end = 10", "end = 2000").replace("timeline = false", "timeline = true")
+    text = TEXT.replace("end = 10", "end = 400").replace("timeline = false", "timeline = true")
     text += "[integrator]\nhold_invariants = true\n"
     return rigidsim.run(rigidsim.parse(text), out=tmp_path_factory.mktemp("runs")).folder.path
 
