@@ -10,26 +10,28 @@ from scipy.integrate import solve_ivp
 
 
 class Delayed:
-    """An elastic body with a delay about a source on a Kepler orbit in the plane XY, in doubles."""
+    """An elastic body with a delay about a source on a Kepler orbit, in doubles."""
 
     def __init__(
         self, moments: Sequence[float], elastic: float, delay: float, mean_rate: float, attraction: float,
-        axis: float, eccentricity: float, *, steps: int = 4,
+        axis: float, eccentricity: float, *, steps: int = 4, tilt: float = 0, node: float = 0,
     ) -> None:  # fmt: skip
         self.tensor, self.inverse = np.diag(moments), np.diag(1 / np.array(moments))
         self.elastic, self.delay, self.mu, self.steps = elastic, delay, attraction, steps
         self.offset = elastic / 3 * mean_rate**2 * (np.eye(3) / 3 - np.diag([0, 0, 1]))
-        self.a, self.e = axis, eccentricity
+        self.a, self.e, self.tilt, self.node = axis, eccentricity, tilt, node
 
     def source(self, t: float) -> np.ndarray:
-        """Its place, by Kepler's equation."""
+        """Its place, by Kepler's equation, in a plane whose node moves at a rate."""
         mean = np.sqrt(self.mu / self.a**3) * t
         anomaly = mean
         for _ in range(30):
             error = anomaly - self.e * np.sin(anomaly) - mean
             anomaly -= error / (1 - self.e * np.cos(anomaly))
-        b = np.sqrt(1 - self.e**2)
-        return self.a * np.array([np.cos(anomaly) - self.e, b * np.sin(anomaly), 0.0])
+        x, y = np.cos(anomaly) - self.e, np.sqrt(1 - self.e**2) * np.sin(anomaly)
+        c, s = np.cos(self.node * t), np.sin(self.node * t)
+        flat, up = y * np.cos(self.tilt), y * np.sin(self.tilt)
+        return self.a * np.array([c * x - s * flat, s * x + c * flat, up])
 
     def caused(self, t: float, w: np.ndarray, r: np.ndarray) -> np.ndarray:
         """The distortion that a moment causes, without delay."""

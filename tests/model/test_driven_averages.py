@@ -1,10 +1,12 @@
 """Averages under torques of the body alone: means over polhodes, their start, and what forbids them."""
 
+import math
+
 import numpy as np
 import pytest
-from equations import EPS, Random, derivative
+from equations import EPS, Random, derivative, matrix
 from scipy.integrate import solve_ivp
-from support import config
+from support import config, run_text
 
 from rigidsim import ConfigError, parse
 from rigidsim.solve.problem import InitialValueProblem, prepare
@@ -50,6 +52,43 @@ def test_a_viscous_torque_averages_to_the_same_by_closed_means_and_by_nodes() ->
 
 
 # --- the start ----------------------------------------------------------------------------------------------
+
+
+def full(moments: np.ndarray, rates: list[float], damping: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Angular momentum in space, (3, n), by Euler's equations and the attitude's."""
+
+    def change(_: float, y: np.ndarray) -> np.ndarray:
+        attitude, w = y[:9].reshape(3, 3), y[9:]
+        skew = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+        turned = (-damping * w - np.cross(w, moments * w)) / moments
+        return np.concatenate([(attitude @ skew).ravel(), turned])
+
+    start = np.concatenate([matrix(Q).ravel(), rates])
+    found = solve_ivp(change, (0, times[-1]), start, "DOP853", times, rtol=1e-10, atol=1e-12).y
+    return np.einsum("abt,bt->at", found[:9].reshape(3, 3, -1), moments[:, None] * found[9:])
+
+
+@pytest.mark.slow
+def test_the_averaged_motion_starts_in_the_middle_of_the_full_one() -> None:
+    """Direction and size of the momentum against means (Hann) of the full motion over some hundred turns."""
+    start = f"angular_velocity = {RATES}\nquaternion = {Q.tolist()}"
+    level = '[model]\nlevel = "spin_averaged"'
+    body = f"principal_moments = {MOMENTS}"
+    record = 'record = ["momentum_axis", "angular_momentum_norm"]'
+    data = run_text(config(body, start, VISCOUS, "end = 50\nsamples = 11", "", record, level)).dataset
+    times = np.linspace(0, 400, 8001)
+    momentum = full(np.array(MOMENTS), RATES, np.array(DAMPING), times)
+    weights = np.hanning(len(times))
+    directions = momentum / np.linalg.norm(momentum, axis=0)
+    true = directions[:, 0] - directions @ weights / weights.sum()
+    # of second order: the torque over the momentum times rates, and what it changes by over the times
+    off = directions[:, 0] - data["momentum_axis"].values[0]
+    np.testing.assert_allclose(off, true, atol=0.05 * np.linalg.norm(true))
+    size = np.log(np.linalg.norm(momentum, axis=0))
+    fit = np.polynomial.polynomial.polyfit(times, size, 3, w=np.sqrt(weights))
+    shift = size[0] - fit[0]
+    assert abs(shift) > 5e-7  # so that there is something to find
+    assert math.log(float(data["angular_momentum_norm"][0])) == pytest.approx(fit[0], abs=0.1 * abs(shift))
 
 
 # --- what has no average ---------------------------------------------------------------------------------

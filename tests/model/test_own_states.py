@@ -1,11 +1,12 @@
 """User-defined states (``[[states]]``) against closed forms, and in the equations against numpy."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from equations import CLOSE, Random, derivative
-from support import EPSILON, config, loaded, run_text, wide
+from support import EPSILON, config, loaded, run_text, same_bits, wide
 
 import rigidsim
 from rigidsim import ConfigError
@@ -77,6 +78,16 @@ def test_a_law_that_reads_a_limited_state_switches_in_its_derivative() -> None:
     exact = np.where(t < 2, 3 - t, 2 - np.exp(t - 2))
     np.testing.assert_allclose(data["u"].values, exact, rtol=0, atol=1e-14)
     np.testing.assert_allclose(data["gone_time"].values, [2 + np.log(2)], rtol=0, atol=1e-14)
+
+
+@pytest.mark.slow
+@pytest.mark.unoptimised
+def test_a_run_with_a_state_that_grows_is_prolonged_bit_for_bit(tmp_path: Path) -> None:
+    """Its unit doesn't depend on the end."""
+    more = state("grows", "1e6 + wx", 0, "rad") + state("held", "sin(t)")
+    done = run_text(config(more=more, time="end = 10\nsamples = 11"), out=tmp_path / "short")
+    longer = rigidsim.resume(done.folder.path, until="160")
+    same_bits(longer, run_text(config(more=more, time="end = 160\nsamples = 161")))
 
 
 def test_only_what_is_read_or_recorded_is_carried() -> None:

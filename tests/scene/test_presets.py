@@ -102,6 +102,8 @@ FACTS: list[tuple[str, str, Any, float]] = [
     ("eros", "days", 5.27025547 / 24, 6e-7),
     ("bennu", "days", 4.296057 / 24, 5e-7),
     ("didymos", "days", 2.26 / 24, 5e-5),
+    ("cubesat_3u", "GM", 4 * 6.67430e-11, 1e-15),
+    ("cubesat_3u", "A/C", 2.28487490131579, 1e-12),  # of five boxes, by Steiner's theorem
     ("eros", "J2", 0.052478 * math.sqrt(5), 1e-3),
     ("eros", "C22", math.sqrt(5 / 12) * math.hypot(0.082538, 0.027745), 1e-3),
     ("eros", "GM", 2670 * 2503e9 * 6.67430e-11, 0.01),  # density and volume of Yeomans et al. 2000

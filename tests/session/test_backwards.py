@@ -95,6 +95,18 @@ def test_events_dates_and_lines_are_those_of_the_motion_forwards(tmp_path: Path)
     assert "returns to its start" in verdict.as_dict()["reversal"]["words"]
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
+def test_members_go_either_way(tmp_path: Path) -> None:
+    swept = config(loads=DRIVEN[1]) + '[sweep]\nkeep = ["final"]\naxes."time.end" = {values = [-2, 1]}\n'
+    members = rigidsim.sweep(rigidsim.parse(swept), out=tmp_path).dataset
+    for n, end in enumerate((-2, 1)):
+        alone = loaded(run_text(config(loads=DRIVEN[1]), f"time.end={end}")).isel(time=-1)
+        found = members.angular_velocity_final.values[n]
+        np.testing.assert_allclose(found, alone.angular_velocity.values, rtol=0, atol=1e-13)
+        assert members.time_reached.values[n] == end
+
+
 @pytest.mark.parametrize(
     ("time", "words"),
     [

@@ -168,6 +168,18 @@ def test_the_moons_state_is_the_observed_one_with_its_librations() -> None:
 
 
 @pytest.mark.slow
+def test_a_triaxial_planet_out_of_step_starts_by_its_mean_moments() -> None:
+    """Mars' own moments, and the mean of both: one start."""
+    orbit = 'semi_major_axis = "1.523679 au"\ninclination = "1.67 deg"\nnode_rate = "-17.6 arcsec/yr"'
+    given = {"name": "cassini_2", "strength": "1.32712440018e20", "orbit": orbit}
+    bodies = ('preset = "mars"', "principal_moments = [0.99461983, 0.99461983, 1]")
+    own, mean = (scene_of(given | {"body": body}, start='spin_period = "24.622962 h"') for body in bodies)
+    pole, other = (matrix_of(np.array([float(x) for x in s.quaternion]))[:, 2] for s in (own, mean))
+    np.testing.assert_allclose(pole, other, atol=1e-10)
+    assert own.body.principal_moments[0] != own.body.principal_moments[1]
+
+
+@pytest.mark.slow
 def test_mercurys_state_in_three_turns_to_two_revolutions() -> None:
     """2.04(8) arcmin from the orbit's normal (Margot et al. 2012), whose moments the preset has."""
     orbit = 'semi_major_axis = "57909050 km"\neccentricity = 0.20563\ninclination = "8.58 deg"\n'

@@ -97,6 +97,25 @@ def test_dry_friction_brings_the_body_to_rest_and_holds_it(precision: str) -> No
         assert abs(found["qz"] - mpmath.sin(half)) < 16 * EPSILON[precision]
 
 
+def test_friction_about_three_axes_ends_in_rest() -> None:
+    """Three surfaces at once; the work is minus the energy at the start."""
+    friction = ", ".join(f'"-0.3*sign(w{axis})"' for axis in "xyz")
+    text = config(
+        "principal_moments = [1, 1.3, 2]",
+        "angular_velocity = [0.5, 0.7, 1]",
+        f'kind = "torque"\ncomponents = [{friction}]',
+        "end = 20\nsamples = 3",
+    )
+    prepared = prepare(rigidsim.parse(text))
+    kept = Kept()
+    progress = assemble(prepared).driver(kept).run()
+    assert progress.status is Status.FINISHED
+    states = dict(zip(prepared.system.states, kept.states[-1], strict=True))
+    energy = np.ldexp((0.25 + 1.3 * 0.49 + 2) / 2, -prepared.system.scaling.energy)
+    assert max(abs(states[name]) for name in ("wx", "wy", "wz")) < 8 * EPSILON["double"]
+    assert abs(states["work"] + energy) < 32 * EPSILON["double"] * energy
+
+
 SIDES = [
     ("sign((t - 5)^2)", 10.0),  # touched, never crossed
     ("step(t - 2.5)*min(t, 4)", (16 - 6.25) / 2 + 24),
