@@ -130,20 +130,6 @@ def test_errors_are_those_of_noise() -> None:
     assert 0.6 < spread[1] < 1.5
 
 
-def test_a_secular_rate_has_an_honest_error() -> None:
-    # of a slow line of which the samples hold a third of a turn nothing can be known: the error has to say so
-    count = 2000
-    x = (2 * np.arange(count) - (count - 1)) / count
-    rate, slow = 2.0, 0.1 * np.sin(np.pi * x / 3 + 0.4)
-    values = rate * x + slow + 0.3 * np.cos(2 * np.pi * 40 * x)
-    found = decompose(SignalSamples(((values, 0 * values),), True, 53, CONTEXT), 6, 1, 1e-12)
-    off = abs(float(found.sum.polynomial[1].real) - rate)
-    assert off < 0.1 * np.pi / 3 * 1.5
-    clean = decompose(SignalSamples(((values - slow, 0 * values),), True, 53, CONTEXT), 6, 1, 1e-12)
-    assert abs(float(clean.sum.polynomial[1].real) - rate) < 1e-13
-    assert found.polynomial_errors[1] > 1e6 * clean.polynomial_errors[1]
-
-
 # ---- lines are called what they are: in band, folded, ambiguous, and not at all where nothing fits
 
 YEAR, MONTH, NODE = 2 * math.pi / 365.25, 2 * math.pi / 27.3217, -2 * math.pi / 6798.38

@@ -6,42 +6,23 @@ from typing import Any
 
 import pytest
 
-ESTIMATED = ("--set", "output.estimate=true")
-DETAILS = "rigidsim info runs/free   (invariants, start, cost by phase)"
+Config = Callable[..., str]
+Command = Callable[..., Any]
+NEXT = """next     rigidsim resume runs/free
+         rigidsim info runs/free   (invariants, start, cost by phase)
+"""
 
 
-@pytest.fixture
-def screen(
-    config: Callable[..., str], rigidsim_command: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
-) -> Callable[..., list[str]]:
-    """Lines of a run's table, eighty columns wide."""
+def test_a_run_that_a_guard_stopped_is_resumed_next(
+    config: Config, rigidsim_command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-
-    def shown(*options: str, **given: str) -> list[str]:
-        done = rigidsim_command("run", config(**given), *ESTIMATED, *options)
-        return done.stdout.splitlines()
-
-    return shown
-
-
-def said(lines: list[str], label: str) -> list[str]:
-    """What stands behind a label, its further lines among it."""
-    begun = next(n for n, line in enumerate(lines) if line.startswith(f"{label:8} "))
-    rest = lines[begun + 1 :]
-    more = next((n for n, line in enumerate(rest) if not line.startswith(" " * 9)), len(rest))
-    return [line[9:] for line in lines[begun : begun + 1 + more]]
-
-
-def test_a_run_that_a_guard_stopped_is_resumed_next(screen: Callable[..., list[str]]) -> None:
-    lines = screen("--set", "limits.max_steps=1")
-    assert said(lines, "next") == ["rigidsim resume runs/free", DETAILS]
-    assert not any(line.startswith("advice") for line in lines)
+    shown = rigidsim_command("run", config(), "--set", "limits.max_steps=1").stdout
+    assert NEXT in shown
+    assert "advice" not in shown
 
 
 # ---- what was understood of a config is echoed in units that show a mistake at once
-
-Config = Callable[..., str]
-Command = Callable[..., Any]
 
 
 @pytest.fixture

@@ -18,7 +18,6 @@ from rigidsim.scene.readable import YEAR
 
 Ready = Callable[..., rigidsim.SavedRun]
 _UNITS = {"d": 86400.0, "yr": YEAR, "kyr": 1e3 * YEAR, "s": 1.0, "min": 60.0, "h": 3600.0}
-_ARCSEC = np.pi / 648000
 
 
 def texts(dataset: object, what: str) -> str:

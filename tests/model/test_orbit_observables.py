@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray
+from kepler import on_ellipse, turned
 from mpmath import mp
 from support import EPSILON, config, loaded, run_text, wide
 
@@ -34,14 +35,6 @@ def rotation(q: list[Any]) -> Any:
     )
 
 
-def turn(angle: Any, axis: int) -> Any:
-    """About space axis 1 or 3."""
-    c, s = mp.cos(angle), mp.sin(angle)
-    if axis == 1:
-        return mp.matrix([[1, 0, 0], [0, c, -s], [0, s, c]])
-    return mp.matrix([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-
-
 def unit(vector: Any) -> Any:
     return vector / mp.norm(vector)
 
@@ -52,11 +45,10 @@ def cross(a: Any, b: Any) -> Any:
 
 def kepler(time: Any, e: Any, node: Any, periapsis: Any) -> tuple[Any, Any]:
     """Direction to the source and normal of ``ORBIT``, space axes."""
-    mean = mp.mpf("0.2") + time
-    anomaly = mp.findroot(lambda x: x - e * mp.sin(x) - mean, mean)
-    place = mp.matrix([mp.cos(anomaly) - e, mp.sqrt(1 - e * e) * mp.sin(anomaly), 0])
-    plane = turn(mp.mpf("0.5") + node * time, 3) * turn(mp.mpf("0.7"), 1)
-    return unit(plane * turn(mp.mpf("0.3") + periapsis * time, 3) * place), plane * mp.matrix([0, 0, 1])
+    place = on_ellipse(mp, 1, e, mp.mpf("0.2") + time)
+    plane = (mp.mpf("0.7"), 1), (mp.mpf("0.5") + node * time, 3)
+    place = turned(mp, place, (mp.mpf("0.3") + periapsis * time, 3), *plane)
+    return unit(mp.matrix(place)), mp.matrix(turned(mp, [0, 0, 1], *plane))
 
 
 def defined(matrix: Any, down: Any, normal: Any) -> list[Any]:

@@ -50,10 +50,6 @@ def test_aliased_rows_do_not_agree() -> None:
     assert rigidsim.compare(experiment, spinning(-0.03, 14.0)).verdict == "agrees"
 
 
-def test_the_order_of_columns_is_said() -> None:
-    assert rigidsim.compare(rigidsim.parse(SPIN), spinning(-0.03, 14.0)).convention.order == "xyzw"
-
-
 @pytest.mark.parametrize("zero", [7e8, 1.7e13, -1e9])
 def test_times_counted_from_another_zero_are_refused_with_the_shift(zero: float) -> None:
     table = spinning(-0.03, 14.0)

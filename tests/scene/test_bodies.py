@@ -202,6 +202,3 @@ def test_a_parts_euler_angles_turn_its_tensor() -> None:
     text = f'name = "b"\nintegrator.euler_sequence = "zyx"\n[body]\nparts = [{{{part}}}]\n'
     scene = build_scene(parse(text + "[initial]\nangular_velocity = [0, 0, 1]\n[time]\nend = 1"))
     np.testing.assert_allclose(numbers(scene.body.inertia), r @ straight @ r.T, rtol=0, atol=CLOSE)
-
-
-# ---- the Earth --------------------------------------------------------------------------------------------

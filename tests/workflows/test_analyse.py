@@ -1,6 +1,5 @@
 """analyse: frequencies of closed forms against elliptic functions, datasets from anywhere, refusals."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -8,11 +7,9 @@ import numpy as np
 import pytest
 import xarray
 from support import config, run_text
-from typer.testing import CliRunner
 
 import rigidsim
 from rigidsim import RigidsimError
-from rigidsim.cli.app import app
 from rigidsim.scene.scene import build_scene
 
 MOMENTS, RATES = ["3", "2", "1"], ["0.3", "0.2", "1"]
@@ -123,29 +120,3 @@ def test_what_cannot_be_analysed_is_refused() -> None:
     for dataset, options, message in REFUSED:
         with pytest.raises(RigidsimError, match=message):
             rigidsim.analyse(dataset, **options)
-
-
-@pytest.mark.slow
-def test_the_command_prints_a_table_and_writes_dataset_and_figure(tmp_path: Path) -> None:
-    text = config(
-        time="end = 60\nsamples = 601",
-        integrator='method = "closed_form"',
-        output='record = ["angular_velocity"]\nestimate = false',
-    )
-    folder = run_text(text, out=tmp_path).folder.path
-    shown = CliRunner().invoke(app, ["analyse", str(folder), "--lines", "3"])
-    assert shown.exit_code == 0, shown.output
-    assert "wobble" in shown.stdout
-    assert (folder / "analysis.png").stat().st_size > 10_000
-    with xarray.open_dataset(folder / "analysis.h5") as saved:
-        assert saved["label"][0, 0].item() == "wobble"
-        assert saved.sizes["line"] == 3
-        first, error = float(saved["frequency"][0, 0]), float(saved["frequency_error"][0, 0])
-    options = ["--json", "--variable", "angular_velocity.z", "--out", str(tmp_path / "a.nc")]
-    told = CliRunner().invoke(app, ["analyse", str(folder), *options])
-    found = json.loads(told.stdout)
-    assert [signal["name"] for signal in found["signals"]] == ["angular_velocity.z"]
-    assert found["signals"][0]["lines"][0]["frequency_rad_per_s"] == pytest.approx(2 * first, abs=20 * error)
-    assert (tmp_path / "a.png").exists()
-    refused = CliRunner().invoke(app, ["analyse", str(folder), "--out", str(tmp_path / "a.png")])
-    assert refused.exit_code == 2
