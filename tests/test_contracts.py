@@ -34,6 +34,9 @@ FLIGHT = config(
         'kind = "viscous_torque"\ncoefficients = [0.001, 0.002, 0.003]',
         'kind = "force"\ncomponents = ["0", "0.01*cos(t)", "0.02"]\nframe = "body"\npoint = [0.1, 0, 0.3]',
     ],
+    more='[[events]]\nname = "burn"\ntime = 3.3\naction = "impulse"\naxes = "body"\n'
+    "velocity = [0.05, 0, 0.1]\n"
+    "angular_impulse = [0, 0.1, 0]\n",
 )
 SATELLITE = config(
     "principal_moments = [1, 1.2, 1.5]\nmass = 2\n"
@@ -93,8 +96,11 @@ PAIR = config(
     [
         'kind = "mutual_gravity"\ndegree = 4',
         'kind = "viscous_torque"\ncoefficients = [1e6, 2e6, 3e6]',
+        'kind = "gravity_gradient"\ngravitational_parameter = 0.5\norbit = {semi_major_axis = 9}',
     ],
-    more='[[rigid_bodies]]\nname = "moon"\nshape = "cylinder"\nmass = 1e10\nradius = 0.2\nheight = 0.7\n'
+    more='[[events]]\nname = "hit"\ntime = 3.3\naction = "impulse"\nbody = "moon"\naxes = "rtn"\n'
+    "velocity = [0.01, 0.03, 0.02]\nangular_velocity = [0.1, 0, 0]\n"
+    '[[rigid_bodies]]\nname = "moon"\nshape = "cylinder"\nmass = 1e10\nradius = 0.2\nheight = 0.7\n'
     "euler_angles = [0.3, 0.5, 0.2]\nangular_velocity = [0.2, -0.3, 0.6]\n"
     "position = [2, 0.1, 0.3]\nvelocity = [0.1, 1.1, 0.2]\n",
 )
@@ -107,7 +113,7 @@ SCENES = {
 }  # fmt: skip
 MAIN = ("flight", "satellite", "spinner", "elastic", "top", "pair")
 VARIED: dict[str, dict[str, list[Any]]] = {
-    "flight": {"loads[0].gravitational_parameter": [0.9, 1.1], "loads[3].coefficients[1]": [0.0, 0.1]},
+    "flight": {"loads[0].gravitational_parameter": [0.9, 1.1], "events[0].velocity[2]": [0.0, 0.1]},
     "satellite": {
         "body.core.moment": [0.05, 0.1],
         "body.core.flattening": [0.0, 0.02],
