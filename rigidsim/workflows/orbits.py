@@ -166,7 +166,7 @@ def write_orbits(
     )
     averages = _Averages(start, rhythm, [1 + PLANETS.index(name) for name in names])
     if resume and unfinished.path.exists():
-        done = unfinished.restored(averages, files)
+        unfinished.restore(averages)
     else:
         if unfinished.path.exists() and not force:
             what = (
@@ -174,44 +174,40 @@ def write_orbits(
             )
             raise RunFolderError(f"{unfinished.path}: {what}")
         refuse_loss(files, [], force=force)
-        done = _Done([0] * len(names), 0, 0.0, np.zeros(len(names)))
     begin = saved = time.perf_counter()
     first, complete = averages.share, True
     with ExitStack() as stack:
         stack.enter_context(_writing(files[0]))
-        opened = [stack.enter_context(file.open("a", encoding="utf-8", newline="\n")) for file in files]
-        unfinished.save(averages, done)
-        for name, file, size in zip(names, opened, done.sizes, strict=True):
-            file.truncate(size)
-            if not size:
+        unfinished.save(averages)
+        opened = [stack.enter_context(_table(file, averages.rows)) for file in files]
+        for name, file in zip(names, opened, strict=True):
+            if not averages.rows:
                 file.write(_HEAD.format(planet=name.title(), end=end, window=window, kernel=kernel))
         show = stack.enter_context(meter())
         show.name = "orbits"
         show.phase(f"integrating the planets to {end}")
         try:
-            for row, means in averages:
+            for means in averages:
                 for file, (k, h, ix, iy, _) in zip(opened, means, strict=True):
                     angles = 2 * math.asin(math.hypot(ix, iy) / 2), math.atan2(iy, ix), math.atan2(h, k)
                     degrees = ", ".join(f"{math.degrees(x):.10f}" for x in angles)
-                    file.write(f"{rhythm.year(row):.12g}, {math.hypot(k, h):.12f}, {degrees}\n")
+                    file.write(f"{averages.year:.12g}, {math.hypot(k, h):.12f}, {degrees}\n")
                     file.flush()
-                sizes = [os.fstat(file.fileno()).st_size for file in opened]
-                done = _Done(sizes, done.rows + 1, rhythm.year(row), done.axes + means[:, 4])
                 now, share = time.perf_counter(), averages.share
                 if now > saved + SAVED_EVERY:
-                    unfinished.save(averages, done, opened)
+                    unfinished.save(averages, opened)
                     saved = now
                 left = left_text(now - begin, (share - first) / (1 - first))
-                show.update(share, f"{100 * share:.1f} %, t = {done.reached / 1000:,.6g} kyr, {left}")
+                show.update(share, f"{100 * share:.1f} %, t = {averages.year / 1000:,.6g} kyr, {left}")
         except KeyboardInterrupt:
             complete = False
-        axes = dict(zip(names, (done.axes / max(done.rows, 1)).tolist(), strict=True))
+        axes = dict(zip(names, (averages.axes / max(averages.rows, 1)).tolist(), strict=True))
         for file, axis in zip(opened, axes.values(), strict=True):
             file.write(f"# mean semi-major axis {axis:.10f} au\n")
             file.flush()
         if complete:
             unfinished.remove()
-    return Orbits(files, done.rows, done.reached, axes, complete)
+    return Orbits(files, averages.rows, averages.year if averages.rows else 0.0, axes, complete)
 
 
 def _seconds(option: str, given: Any) -> float:
@@ -265,16 +261,19 @@ def _start(name: str) -> np.ndarray:
 
 
 class _Averages:
-    """Rows by number, with the means of the bodies' elements (bodies, 5).
+    """Means of the bodies' elements (bodies, 5), row by row.
 
     Attributes:
-        look: number of the last look. seen: elements at the looks that the next row may need. planets: there.
+        look: number of the last look. seen: elements at the looks that the next row may need.
+        rows: given so far. axes: sums of their semi-major axes, au.
+        planets: at the last look; None before the first.
     """
 
     def __init__(self, start: np.ndarray, rhythm: _Rhythm, bodies: list[int]) -> None:
         self._start, self._rhythm, self._bodies = start, rhythm, bodies
         self._last = (rhythm.rows + BEYOND) * rhythm.looks + rhythm.half
         self.look, self.seen = rhythm.first - 1, list[np.ndarray]()
+        self.rows, self.axes = 0, np.zeros(len(bodies))
         self.planets: _Sun | None = None
 
     @property
@@ -282,7 +281,12 @@ class _Averages:
         """How much of the way is done."""
         return (self.look - self._rhythm.first + 1) / (self._last - self._rhythm.first + 1)
 
-    def __iter__(self) -> Iterator[tuple[int, np.ndarray]]:
+    @property
+    def year(self) -> float:
+        """Of the last row, years since J2000."""
+        return self._rhythm.year(self.rows - 1 - BEYOND)
+
+    def __iter__(self) -> Iterator[np.ndarray]:
         rhythm = self._rhythm
         weights = np.cos(np.pi * np.arange(-rhythm.half, rhythm.half + 1) / (2 * rhythm.half + 2)) ** 2
         weights /= weights.sum()
@@ -297,19 +301,10 @@ class _Averages:
             if (self.look + rhythm.half) % rhythm.looks <= 2 * rhythm.half:  # within a window
                 kept = self.seen[max(0, len(self.seen) - 2 * rhythm.half) :]
                 self.seen = [*kept, self.planets.elements(self._bodies)]
-            row, rest = divmod(self.look - rhythm.half, rhythm.looks)
-            if not rest and len(self.seen) == len(weights):
-                yield row, np.tensordot(weights, np.array(self.seen), 1)
-
-
-@dataclass(frozen=True)
-class _Done:
-    """Sizes of the tables, bytes; their rows, time of the last one (years), sums of semi-major axes (au)."""
-
-    sizes: list[int]
-    rows: int
-    reached: float
-    axes: np.ndarray
+            if not (self.look - rhythm.half) % rhythm.looks and len(self.seen) == len(weights):
+                means = np.tensordot(weights, np.array(self.seen), 1)
+                self.rows, self.axes = self.rows + 1, self.axes + means[:, 4]
+                yield means
 
 
 @dataclass(frozen=True)
@@ -319,24 +314,23 @@ class _Unfinished:
     path: Path
     about: dict[str, Any]
 
-    def save(self, averages: _Averages, done: _Done, opened: Sequence[TextIO] = ()) -> None:
+    def save(self, averages: _Averages, opened: Sequence[TextIO] = ()) -> None:
         """Replace the state, once the tables are on disk."""
         for file in opened:
             os.fsync(file.fileno())
+        numbers = {name: getattr(averages, name) for name in ("look", "seen", "rows", "axes")}
         with atomic.replacing(self.path) as new:
             content = b"" if averages.planets is None else averages.planets.saved(new)
-            with new.open("wb") as file:
-                about, planets = json.dumps(self.about), np.frombuffer(content, dtype=np.uint8)
-                np.savez(
-                    file, about=about, planets=planets, look=averages.look, seen=averages.seen, **vars(done)
-                )
+            numbers |= {"planets": np.frombuffer(content, np.uint8), "about": json.dumps(self.about)}
+            with new.open("wb") as binary:
+                np.savez(binary, **numbers)
 
     def remove(self) -> None:
         """Remove it, with what killed processes were writing."""
         for path in (*self.path.parent.glob(f".{self.path.name}.*.partial"), self.path):
             path.unlink(missing_ok=True)
 
-    def restored(self, averages: _Averages, files: Sequence[Path]) -> _Done:
+    def restore(self, averages: _Averages) -> None:
         """Set the averages on the state.
 
         Raises:
@@ -351,28 +345,33 @@ class _Unfinished:
                 what = f"was begun with {'; '.join(other)}; give the same, or {FORCE} alone begins again"
                 raise RunFolderError(f"{self.path}: {what}")
             averages.look, averages.seen = int(found["look"]), list(found["seen"])
+            averages.rows, averages.axes = int(found["rows"]), found["axes"]
             averages.planets = _Sun.restored(found["planets"].tobytes()) if found["planets"].size else None
-            sizes, rows, reached = found["sizes"].tolist(), int(found["rows"]), float(found["reached"])
         except (OSError, ValueError, KeyError, RuntimeError, BadZipFile) as error:
             raise RunFolderError(f"{self.path}: is damaged ({error}); {FORCE} alone begins again") from None
-        for file, size in zip(files, sizes, strict=True):
-            if size > (file.stat().st_size if file.exists() else 0):
-                raise RunFolderError(f"{file}: rows were removed since; {FORCE} alone begins again")
-        return _Done(sizes, rows, reached, found["axes"])
+
+
+def _table(path: Path, rows: int) -> TextIO:
+    """A table for further rows, cut after so many."""
+    with path.open("rb+" if rows else "wb") as table:
+        for _ in range(rows + _HEAD.count("\n") if rows else 0):
+            if not table.readline().endswith(b"\n"):
+                raise RunFolderError(f"{path}: rows were removed since; {FORCE} alone begins again")
+        table.truncate(table.tell())
+    return path.open("a", encoding="utf-8", newline="\n")
 
 
 @contextmanager
 def _writing(first: Path) -> Iterator[None]:
-    """Keep other processes out of tables whose folder has the first of them, and say why writing stopped."""
+    """Keep other processes out of the tables' folder, that of the first; say why writing stopped."""
     with ExitStack() as stack:
+        folder = os.open(first.parent, os.O_RDONLY)
+        stack.callback(os.close, folder)
         try:
-            folder = os.open(first.parent, os.O_RDONLY)
-            stack.callback(os.close, folder)
             fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise RunFolderError(
-                f"{first.parent}: another process is at work there; wait for it, or choose another {OUT}"
-            ) from None
+            what = f"another process is at work there; wait for it, or choose another {OUT}"
+            raise RunFolderError(f"{first.parent}: {what}") from None
         try:
             yield
         except OSError as error:

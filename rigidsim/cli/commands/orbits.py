@@ -12,8 +12,9 @@ def orbits(
     as_json: bool,
 ) -> int:  # fmt: skip
     """Integrate the planets; 130 after Ctrl-C, which keeps the rows."""
-    places = {"out": out, "force": force, "resume": resume}
-    found = write_orbits(planets, end, every=every, window=window, kernel=kernel, **places)
+    found = write_orbits(
+        planets, end, every=every, window=window, kernel=kernel, out=out, force=force, resume=resume
+    )
     answer(as_json, found.as_dict(), _print, found)
     return 0 if found.complete else 130
 
