@@ -5,6 +5,7 @@ import math
 import re
 from dataclasses import dataclass
 
+import heyoka as hy
 import mpmath
 import numpy as np
 import pytest
@@ -75,16 +76,21 @@ def potential(one: Points, other: Points, place: object, a: object, b: object, d
             c = sum(p * q for p, q in zip(place, d, strict=True)) / (r * far)
             legendre = [1, c, (3 * c**2 - 1) / 2, (5 * c**3 - 3 * c) / 2, (35 * c**4 - 30 * c**2 + 3) / 8]
             sized = sum((-far / r) ** n * legendre[n] for n in range(degree + 1)) / r
-        total -= number(G) * number(m) * number(n) * sized
+        total -= number(str(G)) * number(m) * number(n) * sized
     return total
 
 
 def pulled(
-    one: Points, other: Points, place: np.ndarray, qs: list[np.ndarray], degree: int | None
+    one: Points,
+    other: Points,
+    place: np.ndarray,
+    qs: list[np.ndarray],
+    degree: int | None,
+    number: type = float,
 ) -> np.ndarray:
-    """U, the force on the other, and the torques on both in their axes, by differences in 40 digits."""
-    with mpmath.workdps(40):
-        step = mpmath.mpf(10) ** -15
+    """U, the force on the other, and the torques on both in their axes, by differences in 80 digits."""
+    with mpmath.workdps(80):
+        step = mpmath.mpf(10) ** -25
         start = [mpmath.mpf(float(x)) for x in place]
         turns = [[[mpmath.mpf(float(x)) for x in row] for row in matrix(q)] for q in qs]
 
@@ -104,7 +110,7 @@ def pulled(
         slopes = [-(at(i, sign=1) - at(i, sign=-1)) / (2 * step) for i in range(3)]
         for body in (0, 1):
             slopes += [-(at(None, body, i, 1) - at(None, body, i, -1)) / (2 * step) for i in range(3)]
-        return np.array([float(x) for x in (at(), *slopes)])
+        return np.array([number(x) for x in (at(), *slopes)])
 
 
 def scene(
@@ -173,6 +179,29 @@ def test_force_and_torques_are_those_of_pairs_of_points(seed: int, degree: int) 
 
 @pytest.mark.slow
 @pytest.mark.unoptimised
+def test_coefficients_have_all_digits_of_the_run() -> None:
+    """Force and torques in 113 bits, of bodies and attitudes that doubles hold exactly."""
+    random = Random(7)
+    thirds = [random.generator.integers(-300, 300, (4, 3)) / 1024 for _ in range(2)]
+    one, other = (Points(np.full(5, 2.0**33), np.vstack([x, -x.sum(axis=0)])) for x in thirds)
+    place, q = np.array([2.5, -1.25, 1.75]), np.full(4, 0.5)
+    text = scene(one.keys, other.keys, 4, place, q=q, integrator='precision = "quadruple"')
+    prepared = prepare(rigidsim.parse(text))
+    system, exact = prepared.system, prepared.precision.exact
+    rhs = hy.cfunc([x for _, x in system.equations], system.variables, fp_type=hy.real128, compact_mode=True)
+    slopes = [exact(x) for x in rhs(prepared.precision.array(system.initial))]
+    sizes = [mpmath.ldexp(1, int(e) - system.scaling.time) for e in system.state_exponents]
+    found = {name: x * size for name, x, size in zip(system.states, slopes, sizes, strict=True)}
+    with mpmath.workdps(40):
+        truth = pulled(one, other, place, [np.array([1.0, 0, 0, 0]), q], 4, mpmath.mpf)[1:].reshape(3, 3)
+        tensors = [mpmath.matrix(np.array(body.inertia).tolist()) for body in (one, other)]
+        expected = [truth[0] / (5 * mpmath.mpf(2) ** 32)]
+        expected += [list(x**-1 * mpmath.matrix(t)) for x, t in zip(tensors, truth[1:], strict=True)]
+        for names, known in zip((NAMES[3:6], ("wx", "wy", "wz"), NAMES[-3:]), expected, strict=True):
+            apart = mpmath.norm([found[name] - x for name, x in zip(names, known, strict=True)])
+            assert apart < mpmath.mpf(10) ** -32 * mpmath.norm(known)
+
+
 def test_errors_of_the_series_fall_with_distance_as_its_first_missing_term() -> None:
     """Of U and the force as r^-(n + 1), of the torque relatively as r^-(n - 1)."""
     random = Random(5)

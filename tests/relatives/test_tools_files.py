@@ -324,3 +324,18 @@ def test_states_of_gubas_are_compared(seed: int, tmp_path: Path) -> None:
     drifts = {x.name: x.largest for x in found.drifts}
     assert drifts.keys() >= {"energy", "angular_momentum"}
     assert max(drifts.values()) < 1e-13 + 1e-3 * slip
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("x_out.bin", "8 bytes.", "needs t_out.bin next to it"),
+        ("FHamiltonianStateOut_1.csv", "1,2\n", "holds momenta; give LagrangianStateOut_1.csv"),
+        ("LagrangianStateOut_1.csv", "1,2\n", "has 2 numbers in a row, where GUBAS writes 32"),
+        ("LagrangianStateOut_1.csv", "t,x\n", "rows of 32 numbers are allowed"),
+    ],
+)
+def test_other_files_of_gubas_are_refused(name: str, text: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(rigidsim.RigidsimError, match=words):
+        rigidsim.compare("didymos", tmp_path / name)
