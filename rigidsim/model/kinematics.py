@@ -226,6 +226,8 @@ class ConstantInertia(Inertia):
             quadratic: dict[tuple[int, int], Any] = {}
             for (axis, a, b), sign in _LEVI_CIVITA.items():
                 for j in range(3):
+                    if not (inverse[i][axis] and self.matrix[a][j]):
+                        continue
                     pair = (min(j, b), max(j, b))
                     term = sign * inverse[i][axis] * self.matrix[a][j] * units[j] * units[b] / units[i]
                     quadratic[pair] = quadratic.get(pair, zero) + term

@@ -558,7 +558,7 @@ class TablePieces(PieceSeries):
         orbit, kind = self._orbit, type(self._number(self._orbit.context.one))
         lengths, found = orbit.narrow_pieces(pieces)
         inverse = np.longdouble(2) ** self._exponent / lengths
-        parameters, states = [inverse], [np.full(len(pieces), self._back)]
+        parameters, states = [inverse], list[Any]([np.full(len(pieces), self._back)])
         for element in self._place.elements(orbit):
             scale, c = 1 / np.longdouble(float(_unit(orbit, element))), found[element]
             steps = [power * c[power] * inverse for power in range(1, _POWERS + 1)]
