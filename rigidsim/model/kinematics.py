@@ -58,6 +58,8 @@ _LEVI_CIVITA = {
     (0, 1, 2): 1, (1, 2, 0): 1, (2, 0, 1): 1,
     (0, 2, 1): -1, (2, 1, 0): -1, (1, 0, 2): -1,
 }  # fmt: skip
+_PAIRS = tuple(dict.fromkeys((min(j, b), max(j, b)) for _, _, b in _LEVI_CIVITA for j in range(3)))
+"""Of rates, in the order in which their terms are summed, which bits depend on."""
 
 
 Term = tuple[Vector, Symbolic]
@@ -223,14 +225,14 @@ class ConstantInertia(Inertia):
         scale = largest_inverse * self._size(self.matrix)
         result = []
         for i in range(3):
-            quadratic: dict[tuple[int, int], Any] = {}
+            quadratic = dict.fromkeys(_PAIRS, zero)
             for (axis, a, b), sign in _LEVI_CIVITA.items():
                 for j in range(3):
                     if not (inverse[i][axis] and self.matrix[a][j]):
                         continue
                     pair = (min(j, b), max(j, b))
                     term = sign * inverse[i][axis] * self.matrix[a][j] * units[j] * units[b] / units[i]
-                    quadratic[pair] = quadratic.get(pair, zero) + term
+                    quadratic[pair] += term
             terms = [
                 number(c) * (states[j] * states[b])
                 for (j, b), c in quadratic.items()
