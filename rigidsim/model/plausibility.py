@@ -25,8 +25,9 @@ from rigidsim.scene.paths import numbers
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.readable import ASTRONOMICAL_UNIT, length_text, span_text
 from rigidsim.scene.registry import LoadFields
-from rigidsim.scene.scene import Event, Scene
+from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
+from rigidsim.scene.swept import plain
 
 _CUBIC_KILOMETRE = 1e9  # m^3
 _AS_PUBLISHED = 1e-3  # relative difference up to which a number is a published one in other units
@@ -453,11 +454,17 @@ def suspicious_end(config: Config) -> list[Problem]:
     ]
 
 
-def unreachable_events(events: Sequence[Event]) -> list[Problem]:
-    """Events that compare the middle Euler angle with what it never is: meant in degrees?"""
-    found = []
-    for event in events:
+def unreachable_events(scene: Scene) -> list[Problem]:
+    """Events at times beyond the run, and those that compare the middle Euler angle with what it never is:
+    meant in degrees?
+    """
+    found, (first, last) = [], sorted(float(plain(x)) for x in (scene.start, scene.end))
+    for event in scene.events:
         root = event.expression
+        if event.time is not None and not first <= float(plain(event.time)) <= last:
+            span = f"{first:.6g} to {last:.6g} s"
+            what = f"given for {float(plain(event.time)):.6g} s, not within the run ({span}); change one"
+            found.append(Problem(root.where, what))
         parts = root.operands if isinstance(root, Operation) and root.operator == "sum" else ()
         constants = [float(part.value) for part in parts if isinstance(part, Constant)]
         names = [part.name for part in parts if isinstance(part, Name)]

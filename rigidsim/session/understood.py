@@ -96,7 +96,7 @@ def understood(prepared: InitialValueProblem, *, sizes: bool = True) -> dict[str
 
 
 def load_descriptions(prepared: InitialValueProblem, *, sizes: bool = True) -> tuple[str, ...]:
-    """The loads and user-defined states, one sentence for each: keys, and torque and force at the start.
+    """Loads, user-defined states and impulses, a sentence for each: keys, and torque and force at the start.
 
     Args:
         sizes: whether torque and force are worked out, for which they are compiled.
@@ -123,7 +123,8 @@ def load_descriptions(prepared: InitialValueProblem, *, sizes: bool = True) -> t
         acting = [f"{kind} {number_text(size, _DIGITS)} {unit}" for kind, size, unit in effects[number]]
         if at_start := [*_seen(place, scene), *acting]:
             said[-1] += f"; at the start {', '.join(at_start)}"
-    return (*said, *(state.described for state in scene.states))
+    impulses = (f"impulse {x.name}: {_value(x)}" for x in scene.config.events if x.action == "impulse")
+    return (*said, *(state.described for state in scene.states), *impulses)
 
 
 def _seen(place: Vector, scene: Scene) -> Iterator[str]:
@@ -190,7 +191,7 @@ def cautions_of(scene: Scene) -> list[Caution]:
     """Values that may mean something other than was understood, found before anything runs."""
     found = cautions_about(scene.config)
     found += [Caution(WarningCode.ANGLE_WITHOUT_UNIT, str(p)) for p in suspicious_expressions(scene)]
-    found += [Caution(WarningCode.NEVER_HAPPENS, str(p)) for p in unreachable_events(scene.events)]
+    found += [Caution(WarningCode.NEVER_HAPPENS, str(p)) for p in unreachable_events(scene)]
     for number, (fields, load) in enumerate(zip(scene.config.loads, scene.given_loads, strict=True), start=1):
         if isinstance(load, Load):
             where = f"[[loads]] number {number}"

@@ -209,6 +209,8 @@ def test_without_a_place_nothing_is_pushed_but_spins_change() -> None:
     push = event("a", time=1, velocity=[1, 0, 0])
     with pytest.raises(rigidsim.ConfigError, match=r"\[body\] has no place"):
         prepare(rigidsim.parse(config(more=push)))
+    late = rigidsim.parse(config(more=event("a", time=10, angular_velocity=[1, 0, 0])))
+    assert ["not within the run" in str(w) for w in rigidsim.plan(late).warnings] == [True]
     spun = config("principal_moments = [2, 2, 2]", more=event("a", time=1, angular_impulse=[0, 1, 0]))
     data = loaded(run_text(spun))
     np.testing.assert_allclose(data.angular_velocity[[0, -1]], [[0.3, 1, 0.5], [0.3, 1.5, 0.5]], rtol=1e-15)
