@@ -9,6 +9,7 @@ import pytest
 import support
 
 import rigidsim
+from rigidsim.cli.completion import settings
 from rigidsim.workflows.ready_scenes import write_new
 
 Config = Callable[..., str]
@@ -128,3 +129,11 @@ def test_check(config: Config, rigidsim_command: Command) -> None:
 
 
 # help and completion
+
+
+def test_keys_and_their_values_are_completed() -> None:
+    assert settings("integrator.meth") == ["integrator.method"]
+    assert "body.preset=moon" in settings("body.preset=mo")
+    assert settings("output.timeline=") == ["output.timeline=true", "output.timeline=false"]
+    assert "integrator.precision=quadruple" in settings("integrator.precision=q")
+    assert settings("nowhere=") == []

@@ -110,6 +110,8 @@ def test_directions_lie_on_the_sphere_and_cover_it() -> None:
 
 REFUSED = {
     "nan": (f"{RATE} = {{values = [0.1, nan]}}", "finite numbers are allowed"),
+    "no way of values": (f'{RATE} = {{name = "rate"}}', "exactly one of linspace"),
+    "a count of none": (f"{RATE} = {{normal = [0, 1]}}", "missing; random values need it"),
     "too many": (
         f'{RATE} = {{step = [0, 1, 1000000]}}\naxes."time.end" = {{step = [1, 1, 1000000]}}',
         "1e12 members; at most 1e8",
