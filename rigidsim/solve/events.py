@@ -27,6 +27,7 @@ BESIDE = 60
 one.
 """
 _WIDTH = 2.0**8  # roundings of a time between two findings of the same crossing
+_LATEST = 256  # events that a step may be taken anew from
 DIRECTIONS = {
     0: hy.event_direction.any,
     1: hy.event_direction.positive,
@@ -81,7 +82,8 @@ class EventLog:
         """Whether a crossing that changes the motion is the one at which the engine's step began."""
         begin = integrator.time - integrator.last_h
         width = precision.of_double(_WIDTH * float(precision.epsilon) * max(abs(float(time)), 1.0))
-        known = [*self.kicked, *(f.time for f in self.found if self.crossings[f.index].kicks)]
+        latest = (f.time for f in self.found[-_LATEST:] if self.crossings[f.index].kicks)
+        known = [*self.kicked[-_LATEST:], *latest]
         return any(abs(begin - at) <= width and abs(time - at) <= width for at in known)
 
     @property
