@@ -233,3 +233,14 @@ def test_surfaces_are_crossed_at_loose_tolerances() -> None:
         for tolerance in (1e-15, 1e-6)
     ]
     assert abs(rates[0] - rates[1]) < 1e-4  # a hundred tolerances
+
+
+def test_a_second_crossing_within_a_step_is_found_where_it_is() -> None:
+    """wx = t - t^2/2 is above 1/2 - 5e-11 for 2e-5 s; four roundings over its rate."""
+    torque = 'kind = "torque"\ncomponents = ["1 - t", "0", "sign(wx - 0.49999999995)"]'
+    prepared = prepare(rigidsim.parse(config(SPHERE, REST, torque, "end = 2\nsamples = 2")))
+    kept = Kept()
+    assemble(prepared).driver(kept).run()
+    place = prepared.system.states.index("wz")
+    rate = np.ldexp(float(kept.states[-1][place]), prepared.system.state_exponents[place])
+    assert abs(rate - (4e-5 - 2)) < 4 * EPSILON["double"] / 1e-5
