@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import product
 from typing import Any
 
@@ -57,8 +57,9 @@ class SurfaceValues:
 
     def noises(self, *states: np.ndarray) -> np.ndarray:
         """Sizes (surfaces, n) below which arguments are zero but for rounding of states (n, states)."""
-        largest = np.max([np.abs(np.atleast_2d(given).astype(np.float64)) for given in states], axis=0)
-        return _ROUNDINGS * self.epsilon * (np.abs(self.by_time) * self.spans + self._sizes(largest.T))
+        plain = (np.abs(np.atleast_2d(given).astype(np.float64, copy=False)) for given in states)
+        sizes = self._sizes(reduce(np.maximum, plain).T)
+        return _ROUNDINGS * self.epsilon * (np.abs(self.by_time) * self.spans + sizes)
 
     def beside(self, state: np.ndarray) -> np.ndarray:
         """Sizes (surfaces,) well above arguments' rounding, added to their events next to their zeros, at the
@@ -129,8 +130,8 @@ class SurfaceFunctions:
         """Surfaces and fields at many states (n, states), times (n,) and parameters (n, parameters)."""
         found = _by_columns(self._everything, states, times, pars)
         s, n = self._surfaces, self._states
-        u, by_time, rates, gradients, field, _ = np.split(found, np.cumsum([s, s, s, s * n, n]))
-        gradients = gradients.reshape(s, n, len(times))
+        u, by_time, rates = found[: 3 * s].reshape(3, s, -1)
+        gradients, field = found[3 * s : (3 + n) * s].reshape(s, n, -1), found[(3 + n) * s :][:n]
         return SurfaceValues(u, by_time, rates, gradients, field, self._moments.spans(times), self._epsilon)
 
     def look(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> SurfaceValues:

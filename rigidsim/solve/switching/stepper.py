@@ -55,7 +55,7 @@ from rigidsim.solve.taylor_stepper import TaylorStepper
 _ATTEMPTS = 32  # at one step that begins on a surface
 _MISTAKEN = 2.0**10  # roundings of an argument from which on the engine can't have found its zero
 _FAR_OFF = 2.0**100  # within the range of single precision
-_FIRST_AHEAD, _MOST_AHEAD = 16, 1024  # steps that are looked at together: some MB of series
+_FIRST_AHEAD, _MOST_AHEAD = 64, 1024  # steps that are looked at together: some MB of series
 _MOST_SWITCHES = 256
 """Switches at intervals shorter than ``_SHORTEST`` that count as an accumulation, or as swings kept up by
 rounding, whose period is the square root of its size.
@@ -296,10 +296,10 @@ class SwitchingStepper(TaylorStepper):
         look = self._functions.look(self.state, self.time, pars)
         # the change of the state in a unit of time shows its size
         near = np.abs(look.u) <= look.noises(self.state, look.field.T)
-        moved, beside = self._usual[: len(self._modes)], look.beside(self.state)
+        moved = self._usual[: len(self._modes)]
         for j in np.flatnonzero(self._free).tolist():
             if (near[j, 0] or j + 1 == self._crossed) and j + 1 != -self._crossed:
-                moved[j] = float(beside[j])
+                moved[j] = float(look.beside(self.state)[j])
         for j in muted:
             moved[j] = _FAR_OFF
         if self.has_events:
@@ -374,7 +374,7 @@ class SwitchingStepper(TaylorStepper):
             self.steps, self._crossed = self.steps + len(passed), -(passed[-1].crossed + 1)
         kept, alone = self._holding(begun, passed)
         alone = alone or (kept == len(passed) and (self._halted or outcome == hy.taylor_outcome.err_nf_state))
-        self._ahead = min(2 * self._ahead, _MOST_AHEAD) if kept == len(passed) else max(kept, 1)
+        self._ahead = min(4 * self._ahead, _MOST_AHEAD) if kept == len(passed) else max(kept, 1)
         if alone or kept < len(passed):
             self._back_among(begun, passed[:kept])
             if samples is not None:
