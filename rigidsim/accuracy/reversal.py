@@ -30,6 +30,9 @@ _SMALL = {
     "momentum_axis": "attitude",
     "angular_velocity": "rates",
     "position": "position",
+    "rigid_body_quaternion": "attitude",
+    "rigid_body_angular_velocity": "rates",
+    "rigid_body_position": "position",
 }
 
 
@@ -40,7 +43,7 @@ class Reversal:
     Attributes:
         attitude: angle, rad; of an averaged motion, of the angular momentum's direction; None without either.
         rates: difference of angular velocities relative to their size; None where none are carried.
-        position: distance, m; None for a body that doesn't fly.
+        position: distance, m; None for a body that doesn't fly. Of two bodies all are the larger ones.
         announced: estimated error of the attitude, or of the rates without one, rad or relative: of the way
             there, as the way back amplifies it, and of the way back; None if they can't be estimated.
         steps: of both ways.
@@ -100,7 +103,9 @@ def there_and_back(experiment: Experiment, loads: Sequence[Load] = (), *, compac
     one = _taken(there, names, "the motion", experiment.config.limits.max_steps or math.inf)
     back = _reversed(there, one.state)
     other = _taken(back, names, "the motion back", _RUNAWAY * one.progress.steps + _SOME)
-    found = {_SMALL[name]: _apart(name, one[name], other[name]) for name in names}
+    found: dict[str, float] = {}
+    for name in names:  # of two bodies the larger one
+        found[_SMALL[name]] = max(found.get(_SMALL[name], 0.0), _apart(name, one[name], other[name]))
     begun, own = (
         estimate_errors(
             problem, way.progress.steps, float(problem.scene.samples.last), corrected=way.parts.corrected
@@ -163,8 +168,8 @@ def _reversed(there: InitialValueProblem, state: np.ndarray) -> InitialValueProb
 def _apart(name: str, there: list[np.ndarray], back: list[np.ndarray]) -> float:
     """Between the start and where the way back ended, both recorded as float64 parts (2, components)."""
     one, other = [part[:1] for part in there], [part[-1:] for part in back]
-    if name == "quaternion":
+    if name.endswith("quaternion"):
         return float(angles_between(one, other)[0])
     apart = float(distances_between(one, other)[0])
     size = max(float(np.linalg.norm(part[0], axis=1).max()) for part in (there, back))
-    return apart / (size or 1.0) if name == "angular_velocity" else apart
+    return apart / (size or 1.0) if name.endswith("angular_velocity") else apart

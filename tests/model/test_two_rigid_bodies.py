@@ -24,6 +24,7 @@ from support import (
 )
 
 import rigidsim
+from rigidsim.accuracy.reversal import there_and_back
 from rigidsim.look.stages.registry import build_picture
 from rigidsim.solve.problem import prepare
 
@@ -177,8 +178,6 @@ def test_force_and_torques_are_those_of_pairs_of_points(seed: int, degree: int) 
     assert seen["separation"][0] == pytest.approx(np.linalg.norm(place), rel=1e-15)
 
 
-@pytest.mark.slow
-@pytest.mark.unoptimised
 def test_coefficients_have_all_digits_of_the_run() -> None:
     """Force and torques in 113 bits, of bodies and attitudes that doubles hold exactly."""
     random = Random(7)
@@ -191,8 +190,8 @@ def test_coefficients_have_all_digits_of_the_run() -> None:
     rhs = hy.cfunc([x for _, x in system.equations], system.variables, fp_type=hy.real128, compact_mode=True)
     slopes = [exact(x) for x in rhs(prepared.precision.array(system.initial))]
     sizes = [mpmath.ldexp(1, int(e) - system.scaling.time) for e in system.state_exponents]
-    found = {name: x * size for name, x, size in zip(system.states, slopes, sizes, strict=True)}
     with mpmath.workdps(40):
+        found = {name: x * size for name, x, size in zip(system.states, slopes, sizes, strict=True)}
         truth = pulled(one, other, place, [np.array([1.0, 0, 0, 0]), q], 4, mpmath.mpf)[1:].reshape(3, 3)
         tensors = [mpmath.matrix(np.array(body.inertia).tolist()) for body in (one, other)]
         expected = [truth[0] / (5 * mpmath.mpf(2) ** 32)]
@@ -202,6 +201,8 @@ def test_coefficients_have_all_digits_of_the_run() -> None:
             assert apart < mpmath.mpf(10) ** -32 * mpmath.norm(known)
 
 
+@pytest.mark.slow
+@pytest.mark.unoptimised
 def test_errors_of_the_series_fall_with_distance_as_its_first_missing_term() -> None:
     """Of U and the force as r^-(n + 1), of the torque relatively as r^-(n - 1)."""
     random = Random(5)
@@ -661,14 +662,16 @@ def test_announced_errors_are_those_of_both_bodies() -> None:
     assert_announced(announced[1::2], true[1::2])
 
 
-def test_certificates_hold_for_both_bodies_and_the_path() -> None:
+@pytest.mark.slow
+def test_certificates_and_reversals_are_those_of_both_bodies_and_the_path() -> None:
     """Of a second body that turns fast, at a loose tolerance, against 80 bits."""
     start = "velocity = [0, 0.1714, 0.001]\nangular_velocity = [1e-3, 2e-3, 3e-3]"
     given = (
         'precision = "double"\ntolerance = 1e-7\nmethod = "taylor"\naccuracy = 1e-3\naccuracy_position = 1'
     )
     time, degree = "end = 2e4\nsamples = 9", "degree = 2"
-    run = run_text(didymos(DIMORPHOS + start, load=degree, time=time, integrator=given))
+    text = didymos(DIMORPHOS + start, load=degree, time=time, integrator=given)
+    run, back = run_text(text), there_and_back(rigidsim.parse(text), compact=True)
     other = didymos(DIMORPHOS + start, load=degree, time=time, integrator='precision = "extended"')
     own, better = loaded(run), loaded(run_text(other))
     both = ("quaternion", "rigid_body_quaternion")
@@ -677,6 +680,8 @@ def test_certificates_hold_for_both_bodies_and_the_path() -> None:
     accuracy = run.summary["accuracy"]
     assert 10 * one < second <= accuracy["certified"] < 4 * second
     assert apart <= accuracy["certified_position"] < 4 * apart
+    assert 10 * one < back.attitude < back.announced
+    assert 0 < back.position < 1
 
 
 CLASSES = [(1.2, 1.1, False), (1.1, 1.3, False), (1.2, 1.5, False)]
