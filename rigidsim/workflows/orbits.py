@@ -21,6 +21,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
@@ -383,8 +384,8 @@ class _Sun:
     """The Sun with its planets in REBOUND: a simulation, ready for steps."""
 
     def __init__(self, simulation: Any) -> None:
-        self._simulation, self._forces = simulation, _forces(len(simulation.particles))
-        simulation.additional_forces = self._forces.address
+        self._simulation = simulation
+        simulation.additional_forces = _forces(len(simulation.particles)).address
 
     @classmethod
     def begun(cls, state: np.ndarray, step: float) -> _Sun:
@@ -438,6 +439,7 @@ class _Sun:
         return np.array([[x.pal_k, x.pal_h, x.pal_ix, x.pal_iy, x.a] for x in found])
 
 
+@cache
 def _forces(count: int) -> Any:
     """Compiled accelerations of relativity and of the Moon, which REBOUND calls at each step."""
     import numba
