@@ -513,7 +513,7 @@ _FEWEST, _MOST, _FIRST = 200, 20_000, 50
 _RATE_NAMES = ("wx", "wy", "wz")
 _DIRECTORY = 100  # times for each of which a directory holds one more
 _PACKET = {0: 8, 1: 4, 2: 14, 3: 7}  # numbers of a row of type 5, by its subtype
-_INSTANTS, _RATES, _LINES, _POLYNOMIALS = 1, 2, 3, 5  # types of segments that have rows
+_INSTANTS, _RATES, _LINES, _POLYNOMIALS = 1, 2, 3, 5  # types of segments that are read
 
 
 def read_ck(path: Path, kernels: Sequence[Path], ahead: Fraction, begin: float, end: float) -> Trajectory:
@@ -566,7 +566,7 @@ def read_rows(path: Path, kernels: Sequence[Path], epoch: Epoch, axes: str | Non
         epoch: date of time 0. axes: the space axes of the attitudes here.
 
     Raises:
-        RigidsimError: SPICE refuses a kernel, or a segment has no rows (types 4 and 6).
+        RigidsimError: SPICE refuses a kernel, or a segment is of another type (4, 6).
     """
     ahead = epoch.since_j2000()
     with _opened(path, kernels, "as kernels = [...] next to file") as (toolkit, number):
@@ -619,7 +619,7 @@ def _own_ticks(toolkit: Any, path: Path) -> tuple[np.ndarray, np.ndarray]:
             kind, rated, first, last = (int(x) for x in whole[2:])
             if kind not in (_INSTANTS, _RATES, _LINES, _POLYNOMIALS):
                 raise RigidsimError(
-                    f"{path}: a segment of type {kind}, which holds polynomials and no rows; segments of "
+                    f"{path}: a segment of type {kind} can't be read; segments of "
                     f"types {_INSTANTS}, {_RATES}, {_LINES} and {_POLYNOMIALS} are allowed: sample it into "
                     "a CSV"
                 )
