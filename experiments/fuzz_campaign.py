@@ -62,7 +62,8 @@ max_steps = {steps}
 """
 
 
-CONFIGS = sorted((Path(__file__).parents[1] / "configs").glob("*.toml"))
+_READY = Path(__file__).parents[1] / "configs"
+CONFIGS = sorted([*_READY.glob("*.toml"), *(_READY / "bodies").glob("*.toml")])
 UNITS = [
     "kg", "m", "s", "rad", "deg", "day", "kg m^2", "km/s", "rpm", "µm", "°", "π", "u", "g0", "Å",
     "arcsec",

@@ -92,6 +92,12 @@ def given_attitude(
             what = "given with quaternion; only one attitude is allowed: remove one of them"
             raise refusal("euler_angles", what)
         angles = [x.at(context) for x in table.euler_angles]
+        most = context.ldexp(context.one, context.prec // 2)
+        if (largest := context.maximum([abs(x) for x in angles])) > most:  # their turns swamp the rest
+            what = (
+                f"given {context.nstr(largest, 3)} rad; up to {context.nstr(most, 3)} rad are allowed: leave "
+            )
+            raise refusal("euler_angles", f"{what}out whole turns")
         return quaternion_from_euler(context, angles, sequence), angles
     if table.quaternion is None:
         return None
