@@ -166,6 +166,7 @@ def test_they_are_found_where_they_hold_and_kept(case: tuple[str, str]) -> None:
         assert rows[invariant]["largest_drift"] <= bound, invariant
         if invariant != L + "across":  # zeros, recorded when named
             assert run.dataset[invariant].attrs["invariant"] == 1
+            assert rows[invariant]["final_drift"] == float(run.dataset[f"{invariant}_drift"][-1])
     assert any(rows[invariant]["largest_drift"] > 0 for invariant in expected)
 
 
