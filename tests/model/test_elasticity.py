@@ -35,7 +35,7 @@ def test_without_delay_and_with_one_up_to_its_third_order(delay: float, within: 
     2.
     """
     turning = MOON.replace("0.1}", "0.1, inclination = 0.4, node_rate = -0.3}")
-    run = run_text(scene(2, f"{ELASTIC}, delay = {delay}", samples=3, loads=turning))
+    run = run_text(scene(1, f"{ELASTIC}, delay = {delay}", samples=3, loads=turning))
     moments, begun = ([float(x) for x in given] for given in (MOMENTS, RATES))
     truth = Delayed(moments, STRENGTH, delay, begun[2], 1.0, 1.0, 0.1, tilt=0.4, node=-0.3)
     rates, attitudes, distortions = truth.followed(begun, run.dataset["time"].values)
