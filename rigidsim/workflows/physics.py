@@ -600,8 +600,8 @@ def _averaged_levels(experiment: Experiment) -> tuple[list[AveragedLevel], list[
 
 
 def _geodetic(scene: Scene) -> list[tuple[str, str]]:
-    """The geodetic precession, which no equations of ours have: how much it would be about the source by
-    which it is largest, 3/2 (G M)^(3/2) / (c^2 r^(5/2)). Nothing without such a source.
+    """The geodetic precession, which the full model hasn't: how much it is at most, at the nearest place of the
+    source by which it is largest, 3/2 (G M)^(3/2) / (c^2 r^(5/2)). Nothing without such a source.
     """
     rates = [0.0]
     for load in loads_of(scene):
@@ -610,5 +610,5 @@ def _geodetic(scene: Scene) -> list[tuple[str, str]]:
             strength = float(plain(source.gravitational_parameter))
             rates.append(1.5 * strength**1.5 / (_LIGHT**2 * distance**2.5))
     size = max(rates) * abs(float(scene.samples.last - scene.start)) * ARCSEC
-    why = f"the equations have none; a free axis would turn by some {size:.2g} arcsec over the span, "
+    why = f"the equations have none; a free axis would turn by at most {size:.2g} arcsec over the span, "
     return [("geodetic precession", why + "an axis locked to its orbit not at all")] if size else []
