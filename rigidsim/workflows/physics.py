@@ -600,8 +600,8 @@ def _averaged_levels(experiment: Experiment) -> tuple[list[AveragedLevel], list[
 
 
 def _geodetic(scene: Scene) -> list[tuple[str, str]]:
-    """The geodetic precession, which the full model hasn't: how much it is at most, at the nearest place of the
-    source by which it is largest, 3/2 (G M)^(3/2) / (c^2 r^(5/2)). Nothing without such a source.
+    """The geodetic precession, which the full model hasn't: its most, at the nearest place of the source by
+    which it is largest, 3/2 (G M)^(3/2) / (c^2 r^(5/2)). Nothing without such a source.
     """
     rates = [0.0]
     for load in loads_of(scene):
