@@ -35,10 +35,6 @@ app = typer.Typer(
 def main() -> None:
     """Entry point of ``rigidsim``."""
     gc.disable()  # modules are no garbage: looking for it takes a tenth of the time of loading them
-    if not any(given.startswith("--scheduler") for given in sys.argv):
-        # where they are installed, xarray loads them in half a second to see that no array is one of theirs
-        for unused in ("dask", "pint"):
-            sys.modules.setdefault(unused, None)  # type: ignore[arg-type]
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # a file's name may be no text
     try:
@@ -55,7 +51,6 @@ def _command(module: str, more: str = "") -> Callable[[Callable[..., None]], Cal
 
         def work(given: dict[str, Any]) -> int:
             command = getattr(import_module(f"rigidsim.cli.commands.{module}"), name)
-            gc.freeze()
             gc.enable()
             compiled = sys.modules.get("rigidsim.solve.compiled")
             if compiled is not None:  # loaded by those that integrate
