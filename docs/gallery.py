@@ -1,11 +1,10 @@
-"""Pictures and numbers of the gallery: every ready config is run for them.
+"""Pictures of the gallery.
 
-``python -m docs.gallery [NAME...]`` runs the configs, draws the figure of ``rigidsim plot`` for all, or for
-the named ones, into docs/figures/gallery, and writes the table of docs/gallery.md. ``--timelines`` draws
-timelines instead, as ``rigidsim view --png`` does; the rerun viewer needs a renderer for it (a software one
-suffices). ``--films`` draws four seconds of the scenes that the site plays, into docs/figures/films.
-``--table`` only prints the table, which a test compares with the page. The site adds a section for each
-config (``docs/builder/sections.py``).
+``python -m docs.gallery [NAME...]`` runs all ready configs, or the named ones, and draws the figure of
+``rigidsim plot`` into docs/figures/gallery. ``--timelines`` draws timelines instead, as ``rigidsim view
+--png`` does; the rerun viewer needs a renderer for it (a software one suffices). ``--films`` draws four
+seconds of the scenes that the site plays, into docs/figures/films. The site adds a section for each config
+(``docs/builder/sections.py``).
 """
 
 from __future__ import annotations
@@ -19,41 +18,13 @@ from typing import Any
 import rigidsim
 from docs.builder import scenes
 from docs.builder.sections import CONFIGS, ROOT
-from rigidsim.look.signals import is_averaged
 
-PAGE = ROOT / "docs" / "gallery.md"
 PICTURES = ROOT / "docs" / "figures" / "gallery"
 _DOTS_PER_INCH = 100
 _COLOURS = 256  # of a picture's palette
 _TIMELINE_WIDTH = 1200
 FILMS = ROOT / "docs" / "figures" / "films"
 _FILM_SECONDS, _FILM_WIDTH, _FILM_COLOURS = 4.0, 480, 64  # some 100 to 400 kB
-_COLUMNS = (
-    "config",
-    "steps",
-    "attitude uncertain by, rad",
-)
-
-
-def numbers(run: rigidsim.Run, config: Path) -> list[str]:
-    """The row of a config's run."""
-    summary = run.summary
-    error = summary["accuracy"]["estimated_attitude_error"]
-    uncertain = "no attitude" if error is None else f"{error:.1e}"
-    if is_averaged(run.dataset.attrs):
-        averaged = run.dataset.attrs.get("modelling_error")
-        uncertain = "axes not estimated" if averaged is None else f"axes {averaged:.1e} (model)"
-    return [
-        f"[{config.stem}](../{config.relative_to(ROOT).as_posix()})",
-        str(summary["cost"]["steps"]),
-        uncertain,
-    ]
-
-
-def table(rows: list[list[str]]) -> str:
-    """Column names, and all rows below."""
-    lines = [_COLUMNS, ["---"] * len(_COLUMNS), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def picture(run: rigidsim.Run, name: str) -> None:
@@ -121,30 +92,21 @@ def _save(drawn: Any, file: str) -> None:
 
 
 def main(given: list[str]) -> None:
-    """Run, draw and write; or only print the table."""
-    alone, timelines, films = (f"--{what}" in given for what in ("table", "timelines", "films"))
-    named = {name for name in given if not name.startswith("-")}
-    rows = []
+    """Run and draw."""
+    timelines, films = (f"--{what}" in given for what in ("timelines", "films"))
+    named = {name for name in given if not name.startswith("-")} or (set(scenes.PLAYED) if films else None)
     with tempfile.TemporaryDirectory() as folder:
         for config in CONFIGS:
-            print(config.stem, file=sys.stderr, flush=True)
-            wanted = config.stem in (named or (scenes.PLAYED if films else {config.stem}))
-            if films and not wanted:
+            if named is not None and config.stem not in named:
                 continue
-            run = rigidsim.run(config, out=folder, changes={"output.timeline": timelines and wanted})
-            rows.append(numbers(run, config))
+            print(config.stem, file=sys.stderr, flush=True)
+            run = rigidsim.run(config, out=folder, changes={"output.timeline": timelines})
             if films:
                 film(run, Path(folder), config.stem)
-            elif timelines and wanted:
+            elif timelines:
                 timeline(run, Path(folder), config.stem)
-            elif not alone and wanted:
+            else:
                 picture(run, config.stem)
-    if alone:
-        print(table(rows))
-    elif not films:
-        text = PAGE.read_text(encoding="utf-8")
-        lines = [line for line in text.splitlines() if line.startswith("|")]
-        PAGE.write_text(text.replace("\n".join(lines), table(rows)), encoding="utf-8")
 
 
 if __name__ == "__main__":

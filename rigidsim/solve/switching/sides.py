@@ -129,9 +129,9 @@ class SurfaceFunctions:
     def looks(self, states: np.ndarray, times: np.ndarray, pars: np.ndarray) -> SurfaceValues:
         """Surfaces and fields at many states (n, states), times (n,) and parameters (n, parameters)."""
         found = _by_columns(self._everything, states, times, pars)
-        s, n = self._surfaces, self._states
-        u, by_time, rates = found[: 3 * s].reshape(3, s, -1)
-        gradients, field = found[3 * s : (3 + n) * s].reshape(s, n, -1), found[(3 + n) * s :][:n]
+        s, n, count = self._surfaces, self._states, len(times)
+        u, by_time, rates = found[: 3 * s].reshape(3, s, count)
+        gradients, field = found[3 * s : (3 + n) * s].reshape(s, n, count), found[(3 + n) * s :][:n]
         return SurfaceValues(u, by_time, rates, gradients, field, self._moments.spans(times), self._epsilon)
 
     def look(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> SurfaceValues:
