@@ -42,11 +42,7 @@ STUDIES = (
 
 
 def run_studies(names: Sequence[str], full: bool, out: Path) -> tuple[list[Check], list[str]]:
-    """Run studies in turn, telling on stderr how long each took.
-
-    Returns:
-        Their checks, named after their studies, and the names of those that broke down.
-    """
+    """Checks of studies, named after them, and the names of those that broke down; stderr has the times."""
     checks: list[Check] = []
     broken = []
     for name in names:

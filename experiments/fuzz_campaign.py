@@ -374,11 +374,7 @@ def _guarded(case: Callable[[int], str], number: int, seconds: float) -> tuple[s
 def campaign(
     case: Callable[[int], str], numbers: range, *, seconds: float, megabytes: int, label: str
 ) -> tuple[Counter[str], dict[int, str]]:
-    """Run the cases in a child process that is renewed when it dies.
-
-    Returns:
-        How often each outcome was seen, and the defects by case number.
-    """
+    """How often each outcome was seen, and defects by number, in a child that is renewed when it dies."""
     counts: Counter[str] = Counter()
     defects: dict[int, str] = {}
     following = numbers.start

@@ -50,10 +50,7 @@ def cost_at(points: Sequence[Point], error: float) -> float | None:
 
     On each curve (points of one title, by error) the logarithm of the cost is interpolated between the two
     settings around the error, but for ``STEPWISE`` ways; past its end no curve is extended, neither to fewer
-    digits nor to more.
-
-    Returns:
-        None if no setting reaches the error.
+    digits nor to more. None if no setting reaches the error.
     """
     found = []
     for title in {p.title for p in points}:
