@@ -74,7 +74,7 @@ def _better(experiment: Experiment, names: Sequence[str]) -> dict[str, list[mpma
     """The last sample of what is recorded, by a run with 80 bits."""
     better = ['integrator.precision="extended"', 'integrator.tolerance="auto"', "output.estimate=false"]
     better.append('integrator.formulation="quaternion"')
-    seen, progress, _ = gone_through(compactly(experiment.having(better)))
+    seen, progress, _ = gone_through(compactly(experiment.with_overrides(better)))
     assert progress.status is Status.FINISHED
     return {name: seen.exact(name)[-1] for name in names}
 

@@ -164,7 +164,9 @@ def judge_average(scene: CoverageScene) -> Judged:
     if progress.status is not Status.FINISHED:
         return begin
     found = Diagnostics(averaged, progress, seen.statistics).modelled(seen.trail)
-    truth, progress, _ = gone_through(compactly(experiment.having(['model.level="full"'])), 2 * MOST_STEPS)
+    truth, progress, _ = gone_through(
+        compactly(experiment.with_overrides(['model.level="full"'])), 2 * MOST_STEPS
+    )
     if progress.status is not Status.FINISHED or found.modelling is None:
         return replace(begin, ended="no truth")
     announced = dict(zip(_AXES, (found.modelling.momentum_axis, found.modelling.figure_axis), strict=True))

@@ -315,7 +315,9 @@ def chosen(
     except ConfigError as error:
         raise error.at(experiment.source) from None
     keys, given = choice.setting.keys(), integrator.model_fields_set
-    return experiment.having([f"integrator.{k}={v}" for k, v in keys.items() if k not in given]), choice
+    return experiment.with_overrides(
+        [f"integrator.{k}={v}" for k, v in keys.items() if k not in given]
+    ), choice
 
 
 def choose(
@@ -659,7 +661,7 @@ def choose_level(
     asked = _asked(experiment)
     considered: list[Considered] = []
     for level in CHEAPEST_FIRST:
-        other = experiment.having([f'model.level="{level}"'])
+        other = experiment.with_overrides([f'model.level="{level}"'])
         found, why_not = None, "its measured error was larger than asked for" if level in without else ""
         try:
             found = None if why_not else measure_modelling(prepare(other, loads=loads))
@@ -682,7 +684,7 @@ def fully(experiment: Experiment) -> Experiment:
     if experiment.config.model.level != AUTO:
         return experiment
     _asked(experiment)
-    return experiment.having([f'model.level="{FULL}"'])
+    return experiment.with_overrides([f'model.level="{FULL}"'])
 
 
 def _asked(experiment: Experiment) -> float:

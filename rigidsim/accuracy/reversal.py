@@ -86,7 +86,7 @@ def there_and_back(experiment: Experiment, loads: Sequence[Load] = (), *, compac
         RigidsimError: it ends before its last sample, or on the way back.
     """
     if not variables_named(experiment.config.integrator.formulation).regular:  # whose charts change
-        experiment = experiment.having(['integrator.formulation="quaternion"'])
+        experiment = experiment.with_overrides(['integrator.formulation="quaternion"'])
     names = [name for name in _SMALL if _records(experiment, name, loads)]
     if "quaternion" in names and "momentum_axis" in names:
         names.remove("momentum_axis")

@@ -274,7 +274,7 @@ class Kinematics:
     _orbits: dict[KeplerOrbit | TabulatedOrbit, OrbitStates] = field(
         default_factory=dict, init=False, repr=False
     )
-    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+    cache: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
     """Long vectors that several expressions share, by what they are."""
 
     @cached_property

@@ -72,7 +72,7 @@ class Probe(Mechanics):
 
         def number(x: Any) -> Any:
             if isinstance(x, Swept):  # zero in all members of a sweep or in none
-                m.made.setdefault(_SWEPT, []).append(x)
+                m.cache.setdefault(_SWEPT, []).append(x)
                 x = context.zero if x == 0 else x.first
             return real(x)
 
@@ -179,16 +179,16 @@ def turned_out(scene: Scene, loads: Sequence[Load], axis: Vector) -> Load | None
 
 def _share(m: Mechanics) -> None:
     """Restrict members of a sweep to these numbers: what vanishes with them may not with others."""
-    for x in m.made.pop(_SWEPT, ()):
+    for x in m.cache.pop(_SWEPT, ()):
         x.decided()
 
 
 def samples(m: Mechanics, about: Vector | None = None) -> list[list[Acting | None]]:
     """What each load exerts at random states (see ``Probe.exerted``); None where that isn't known."""
     key = "samples", None if about is None else tuple(about)
-    if key not in m.made:
-        m.made[key] = [[probe.exerted(load, about) for load in m.loads] for probe in Probe.several(m)]
-    return m.made[key]
+    if key not in m.cache:
+        m.cache[key] = [[probe.exerted(load, about) for load in m.loads] for probe in Probe.several(m)]
+    return m.cache[key]
 
 
 def spared(m: Mechanics, found: Sequence[Sequence[Acting | None]], axis: Vector) -> bool:
@@ -237,8 +237,8 @@ def kept_axes(m: Mechanics) -> dict[str, Vector]:
     """Unit axes in space without a torque about them, where some torque acts, by what momenta along them are
     called: the only one by sources at rest, or by a field; x, y and z by nothing else. The vertical is apart.
     """
-    if "kept axes" in m.made:
-        return m.made["kept axes"]
+    if "kept axes" in m.cache:
+        return m.cache["kept axes"]
     found: dict[str, Vector] = {}
     context, up = m.scene.context, m.numbers.up if m.numbers.arm is not None else None
     marks = [mark for load in m.turning if (mark := load.direction(m.scene)) is not None]
@@ -255,7 +255,7 @@ def kept_axes(m: Mechanics) -> dict[str, Vector]:
     for name, axis in zip("xyz", unit_vectors(context) if m.torque else [], strict=False):
         if not any(parallel(context, axis, other) for other in named) and keeps(m, axis):
             found[name] = axis
-    m.made["kept axes"] = found
+    m.cache["kept axes"] = found
     return found
 
 

@@ -366,7 +366,7 @@ class Experiment:
         named = [folder / text for text in texts for folder in folders]
         return [file for file in dict.fromkeys([path, *named]) if os.path.isfile(file)]
 
-    def having(self, overrides: Sequence[str], *, writes: bool = True) -> Experiment:
+    def with_overrides(self, overrides: Sequence[str], *, writes: bool = True) -> Experiment:
         """The experiment with values replaced by the program rather than the user; see ``parse``. Unless it
         ``writes`` them, the text stays and it takes a tenth of the time: for runs that nobody keeps.
         """

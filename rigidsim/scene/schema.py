@@ -549,7 +549,7 @@ Sigma = Annotated[
 
 
 class KnownWithin(ConfigTable):
-    """Prior knowledge of a value."""
+    """KnownWithin knowledge of a value."""
 
     sigma: Sigma = Field(examples=[0.1, "1e10 m^3/s^2", [0.1, 0.1, 0.2]])
     """standard deviation about the config's value, in the unit of the key; of a vector one for all its

@@ -146,9 +146,9 @@ class Sweep:
         problems = problems or _counts(table, axes)
         if problems:
             raise ConfigError(problems, experiment.source)
-        base = experiment.having(["sweep="])
+        base = experiment.with_overrides(["sweep="])
         if base.config.integrator.hold_invariants == AUTO:  # which members of a sweep haven't
-            base = base.having(["integrator.hold_invariants=false"])
+            base = base.with_overrides(["integrator.hold_invariants=false"])
         return cls(experiment, base, tuple(axes))
 
     @property
@@ -218,7 +218,7 @@ class Sweep:
         names a member that a key doesn't take.
         """
         try:
-            return self.base.having(self.overrides(member), writes=writes)
+            return self.base.with_overrides(self.overrides(member), writes=writes)
         except ConfigError as error:
             raise self.with_member_named(member, error) from None
 
@@ -276,7 +276,7 @@ def scanned(experiment: Experiment, scan: Sequence[str]) -> Experiment:
         fault = Problem(f"--sweep {text[:60]}", f"given {shown(spec)}; allowed: {_SPECS}")
         ensure(understood, ConfigError(fault))
         settings.append(f'sweep.axes."{key}"={table}')
-    return experiment.having(settings)
+    return experiment.with_overrides(settings)
 
 
 _CALL = re.compile(r"(linspace|logspace|step|uniform|normal|sphere)\s*\((.*)\)")

@@ -355,7 +355,7 @@ def cheaper_model(found: Diagnostics, limits: AdviceLimits, go_on: Callable[[], 
     for level in reversed(REDUCED):
         keys = [f'model.level="{level}"', "model.short_period=true"]
         try:
-            other = prepare(prepared.experiment.having(keys), loads=prepared.python_loads)
+            other = prepare(prepared.experiment.with_overrides(keys), loads=prepared.python_loads)
             error = measure_modelling(other, go_on=go_on)
         except ConfigError:  # no such average exists, or it can't provide what is recorded
             continue

@@ -166,7 +166,7 @@ def settings_without(experiment: Experiment, codes: Sequence[str]) -> list[str]:
 def without(experiment: Experiment, codes: Sequence[str]) -> Experiment:
     """The experiment without some of its effects."""
     settings = settings_without(experiment, codes)
-    return experiment.having(settings) if settings else experiment
+    return experiment.with_overrides(settings) if settings else experiment
 
 
 # --- what effects are worth ---------------------------------------------------------------------------------
@@ -361,7 +361,7 @@ def required_physics(
     )
     if write is not None:
         made = _recorded(without(experiment, least.left_out))
-        made = made.having([f'name="{config.name[:_LEAST]}-least"'])  # next to the full one's run
+        made = made.with_overrides([f'name="{config.name[:_LEAST]}-least"'])  # next to the full one's run
         with writing(Path(write)) as new:
             new.write_text(_comments(result) + made.text, encoding="utf-8")
     from rigidsim.look.figures.ladder import ladder_figure  # which loads matplotlib
@@ -432,7 +432,7 @@ class _Models:
             self.compared = "figure_axis" if _recordable(given, "figure_axis") else "momentum_axis"
         settings = _removed(given, _ACCURACY | _BESIDE)
         settings += [f'output.record=["{self.compared}"]', "output.timeline=false"]
-        self._full = chosen(given)[0].having(settings)
+        self._full = chosen(given)[0].with_overrides(settings)
 
     def run(self, codes: Collection[str]) -> _ModelRun:
         """The run without some effects.
@@ -450,7 +450,7 @@ class _Models:
         if len(name) > _LONGEST:
             name = f"{name[: _LONGEST - 9]}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
         estimate = str(not codes).lower()
-        model = without(self._full, codes).having([f'name="{name}"', f"output.estimate={estimate}"])
+        model = without(self._full, codes).with_overrides([f'name="{name}"', f"output.estimate={estimate}"])
         done = self._saved(model)
         summary = done.outcome
         if not isinstance(summary, Summary) or summary.status != "finished":
@@ -514,7 +514,7 @@ def _removed(experiment: Experiment, keys: Collection[str]) -> list[str]:
 
 def _recordable(experiment: Experiment, name: str) -> bool:
     try:
-        prepare(experiment.having([f'output.record=["{name}"]']))
+        prepare(experiment.with_overrides([f'output.record=["{name}"]']))
     except ConfigError:
         return False
     return True
@@ -555,7 +555,11 @@ def _recorded(experiment: Experiment) -> Experiment:
     """The experiment without asking to record what it doesn't have."""
     names = experiment.config.output.record or []
     kept = [name for name in names if _recordable(experiment, name)]
-    return experiment if kept == names else experiment.having([f"output.record={kept}".replace("'", '"')])
+    return (
+        experiment
+        if kept == names
+        else experiment.with_overrides([f"output.record={kept}".replace("'", '"')])
+    )
 
 
 def _comments(plan: PhysicsPlan) -> str:
@@ -587,7 +591,7 @@ def _averaged_levels(experiment: Experiment) -> tuple[list[AveragedLevel], list[
     plainer = _removed(experiment, {"output.record", *_FOR_FULL, *_BESIDE})
     for level in REDUCED:
         try:
-            averaged = prepare(experiment.having([f'model.level="{level}"', *plainer]))
+            averaged = prepare(experiment.with_overrides([f'model.level="{level}"', *plainer]))
             worst = measure_modelling(averaged).worst
             found.append(AveragedLevel(level=level, largest_arcsec=worst * ARCSEC))
         except ConfigError as error:  # without what was given and what to choose: nobody chose it

@@ -72,7 +72,7 @@ def compared_levels(
         row: dict[str, Any] = {"level": level, **unknown}
         known = looked_at.get(level)
         try:
-            prepared = prepare(experiment.having([f'model.level="{level}"']), loads=loads)
+            prepared = prepare(experiment.with_overrides([f'model.level="{level}"']), loads=loads)
         except ConfigError as error:
             found.append(LevelCost(**row, why_not="; ".join(problem.what for problem in error.problems)))
             continue

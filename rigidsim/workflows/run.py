@@ -495,7 +495,7 @@ def _guarded(experiment: Experiment, overrides: Sequence[str]) -> Experiment:
     """The same experiment and text with other guards."""
     if not overrides:
         return experiment
-    limits = experiment.having(overrides).config.limits
+    limits = experiment.with_overrides(overrides).config.limits
     return replace(experiment, config=experiment.config.model_copy(update={"limits": limits}))
 
 
@@ -504,7 +504,7 @@ def _prolonged(experiment: Experiment, until: str) -> Experiment:
     before = build_scene(experiment).samples
     if before.times is not None:
         raise RunFolderError(f"{_UNTIL}: this run has a list of sample times, which no later end prolongs")
-    later = experiment.having([f"time.end={until}"])
+    later = experiment.with_overrides([f"time.end={until}"])
     if later.config.time.every is None:
         intervals = (build_scene(later).samples.exact_last - before.begin) / before.step
         if intervals.denominator != 1:
@@ -512,7 +512,7 @@ def _prolonged(experiment: Experiment, until: str) -> Experiment:
                 f"{_UNTIL} {until}: lies between two samples of the grid; give a whole number of intervals "
                 "of (end - start) / (samples - 1)"
             )
-        later = experiment.having([f"time.end={until}", f"time.samples={intervals.numerator + 1}"])
+        later = experiment.with_overrides([f"time.end={until}", f"time.samples={intervals.numerator + 1}"])
     after = build_scene(later).samples
     if after.count <= before.count:
         raise RunFolderError(f"{_UNTIL} {until}: no later than the run's end, or before its next sample")
@@ -558,7 +558,7 @@ def _continued(experiment: Experiment, last: Path) -> Experiment:
     ends: list[str] = []
     if experiment.text != begun.text:
         ends = assignments(experiment.text, ["time.end", "time.samples"])
-        longer = ends and begun.having(ends).text == experiment.text
+        longer = ends and begun.with_overrides(ends).text == experiment.text
         if not longer or build_scene(experiment).samples.count <= build_scene(begun).samples.count:
             raise RunFolderError(
                 f"{experiment.source}: was changed since the run began "

@@ -129,7 +129,7 @@ def tradeoff(
     judged = [_judged(experiment, file, seconds) for file, seconds in others]  # before what takes long
     resolved = experiment
     if experiment.config.model.level != FULL:
-        resolved = experiment.having([f'model.level="{FULL}"', "model.short_period=false"])
+        resolved = experiment.with_overrides([f'model.level="{FULL}"', "model.short_period=false"])
     dataset = measure(resolved, budget=budget, repeats=repeats, full=full, report=told)
     dataset = with_others(with_models(dataset, experiment), judged)
     result = Tradeoff(dataset, folder)

@@ -113,6 +113,6 @@ def test_what_is_not_conserved_after_all_is_not_put_back_in_silence() -> None:
     assert "drift" in run.summary["warning_codes"]
     assert any("energy was corrected by" in warning for warning in run.summary["warnings"])
     assert verdict_on(run.outcome).soundness is Soundness.DRIFTED
-    guarded = wrong.having(["limits.max_drift=1e-12", "time.samples=1001", f"time.end={4 * end}"])
+    guarded = wrong.with_overrides(["limits.max_drift=1e-12", "time.samples=1001", f"time.end={4 * end}"])
     stopped = rigidsim.run(guarded, loads=[WrongPotential()], out=None)
     assert stopped.summary["status"] == "stopped: max_drift"

@@ -101,7 +101,7 @@ def test_a_file_is_read_as_a_run(tmp_path: Path) -> None:
 @pytest.mark.unoptimised
 def test_the_missing_acceleration_is_told(experiment: rigidsim.Experiment) -> None:
     """What brakes the experiment's body and not theirs: at rows of unequal distances, and with rates."""
-    braked = experiment.having(['loads=[{kind="viscous_torque",coefficients=[0.001,0.001,0.001]}]'])
+    braked = experiment.with_overrides(['loads=[{kind="viscous_torque",coefficients=[0.001,0.001,0.001]}]'])
     times, q, w = theirs()
     kept = np.sort(np.random.default_rng(1).permutation(len(times))[:160])
     kept[0] = 0
@@ -209,7 +209,7 @@ def test_files(experiment: rigidsim.Experiment, tmp_path: Path, suffix: str) -> 
 def test_a_kernel(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
     """A CK that rigidsim exports is read at times between its rows, and comes back to rounding errors."""
     pytest.importorskip("spiceypy")
-    dated = experiment.having(['time.epoch="J2000"', 'frame.axes="ICRF"', "time.samples=31"])
+    dated = experiment.with_overrides(['time.epoch="J2000"', 'frame.axes="ICRF"', "time.samples=31"])
     rigidsim.run(dated, out=tmp_path)
     path, clock = rigidsim.export(tmp_path / "free", "ck", tmp_path / "free.bc")
     found = rigidsim.compare(dated, path, kernels=[clock])

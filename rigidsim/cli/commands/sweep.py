@@ -43,7 +43,7 @@ def run_scanned(
     worst = 0
     for experiment in experiments:
         with meter() as shown:
-            motion = experiment if experiment.config.fit is None else experiment.having(["fit="])
+            motion = experiment if experiment.config.fit is None else experiment.with_overrides(["fit="])
             result = workflow.sweep(
                 scanned(motion, scan), out=out, force=force, observer=SweepProgress(shown)
             )

@@ -333,11 +333,11 @@ class EarthField(DipoleField):
     def over_size(self, m: Kinematics) -> list[Symbolic]:
         size = self.size(m.scene)
         which = IGRF, self.epoch, self.harmonics.degree, *m.carried(self.placement.point), size
-        if which not in m.made:
+        if which not in m.cache:
             place = self.placement.seen(m)
             ratio = self.harmonics.radius / place.unit
-            m.made[which] = self.harmonics.vector(m, place, lambda n: ratio ** (n + 2) / size)
-        return m.made[which]
+            m.cache[which] = self.harmonics.vector(m, place, lambda n: ratio ** (n + 2) / size)
+        return m.cache[which]
 
     def at(self, context: Any, place: Vector, time: Any) -> Vector:
         return self.harmonics.at(context, [-x for x in place], time)

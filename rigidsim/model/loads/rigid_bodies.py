@@ -469,9 +469,9 @@ class SecondBody(Load):
 
     def seen(self, m: Kinematics) -> SecondStates:
         """Its states, and what they do to each other."""
-        if self not in m.made:
-            m.made[self] = self._seen(m)
-        found: SecondStates = m.made[self]
+        if self not in m.cache:
+            m.cache[self] = self._seen(m)
+        found: SecondStates = m.cache[self]
         return found
 
     def __hash__(self) -> int:
@@ -565,11 +565,11 @@ class SecondBody(Load):
 
     def _tides(self, m: Kinematics) -> Tides | None:
         key = "tides", self.name
-        if key not in m.made:
+        if key not in m.cache:
             seen, (far, speed, _) = self.seen(m), self.units(m.scene)
             states = Second(self.states, self.body, seen.place, seen.quaternion, seen.matrix, far, speed)
-            m.made[key] = tides_on(states, m)
-        found: Tides | None = m.made[key]
+            m.cache[key] = tides_on(states, m)
+        found: Tides | None = m.cache[key]
         return found
 
     def carried_at_start(self, scene: Scene) -> tuple[Vector, Any]:

@@ -109,9 +109,9 @@ class AirDensity(NameProvider):
         if AIR_DENSITY not in names:
             return {}
         key = (AIR_DENSITY,)
-        if key not in m.made:
-            m.made[key] = [_density(m)]
-        return {AIR_DENSITY: m.made[key][0]}
+        if key not in m.cache:
+            m.cache[key] = [_density(m)]
+        return {AIR_DENSITY: m.cache[key][0]}
 
 
 def height(m: Kinematics) -> Symbolic:
@@ -160,7 +160,7 @@ def _density(m: Kinematics) -> Symbolic:
 def _geodetic(m: Kinematics) -> list[Symbolic]:
     """Altitude (km), latitude and longitude (rad)."""
     key = ("geodetic",)
-    if key not in m.made:
+    if key not in m.cache:
         source, rows = _known(m.scene)
         place = source.source_place(m)
         far = _number(m, place.unit / 1000) / place.inverse
@@ -168,8 +168,8 @@ def _geodetic(m: Kinematics) -> list[Symbolic]:
         x, y, z = (hy.sum([e * a for e, a in zip(m.fixed(row), space, strict=True)]) for row in rows)
         angle = m.scaled(rotation_rate(m.scene.context), m.scaling.time) * hy.time
         c, s = hy.cos(angle), hy.sin(angle)
-        m.made[key] = hy.model.cart2geo([c * x + s * y, c * y - s * x, z], R_eq=_EQUATOR)
-    return m.made[key]
+        m.cache[key] = hy.model.cart2geo([c * x + s * y, c * y - s * x, z], R_eq=_EQUATOR)
+    return m.cache[key]
 
 
 def _asking(config: Config) -> list[Any]:

@@ -120,8 +120,8 @@ class SwitchingStepper(TaylorStepper):
         self._now = np.zeros(0)  # parameters that sides and equations read, all of them, where steps begin
         self._off, self._signs = precision.of_double(0.0), precision.of_doubles(np.array([-1.0, 1.0]))
         self._narrow = np.array([self._moments.may_mistake(j) for j in range(len(self._modes))], dtype=bool)
-        self._beside = 2.0 ** (-precision.bits - BESIDE)
-        self._usual = [self._beside] * len(self._modes) + [0.0] * len(system.crossings)
+        self._offset_size = 2.0 ** (-precision.bits - BESIDE)
+        self._usual = [self._offset_size] * len(self._modes) + [0.0] * len(system.crossings)
         super().__init__(system, precision, tolerance, start, log)
         # in the partner chart, where a run may begin, angles are plain already
         self._turned = Turned.begun(system, *self._plain(self.state, self.time))
@@ -315,7 +315,7 @@ class SwitchingStepper(TaylorStepper):
         """Offset to add to an event's expression."""
         if self._along and abs(value) <= noise:  # it is zero all along the surface and crosses nothing
             return 2 * noise
-        return self._beside if self._crossed and value == 0 else 0.0
+        return self._offset_size if self._crossed and value == 0 else 0.0
 
     # --- many steps -----------------------------------------------------------------------------------------
 
@@ -714,9 +714,9 @@ class SwitchingStepper(TaylorStepper):
 
         moving = [j for j in on if hint is not None and j == hint[0]]
         moving += [j for j in on if j not in moving and j not in Fields(self._at, [j]).tangential]
-        idle = {j: self._modes[j] or 1 for j in on if j not in moving}
+        tangential = {j: self._modes[j] or 1 for j in on if j not in moving}
         if not moving:
-            return self._by_trial(idle)
+            return self._by_trial(tangential)
         crossed = {}
         if len(moving) > MOST_AT_ONCE:
             crossed = crossings(self._at, {j: self._modes[j] or 1 for j in moving})
@@ -724,31 +724,33 @@ class SwitchingStepper(TaylorStepper):
         if len(moving) > MOST_AT_ONCE:
             return Continuation(None, f"more than {MOST_AT_ONCE} surfaces meet there")
         if not moving:
-            return Continuation({**idle, **crossed})
+            return Continuation({**tangential, **crossed})
         choice = Fields(lambda sides: self._at({**crossed, **sides}), moving).choose()
         if choice.modes is not None:
-            return Continuation({**idle, **crossed, **choice.modes})
+            return Continuation({**tangential, **crossed, **choice.modes})
         if not choice.tangential or hint is None or hint[0] in crossed:
             return choice
         # touched: rounding hides the rates, but the step was seen to reach the other side
-        return Continuation({**idle, **crossed, **{j: self._modes[j] for j in moving}, hint[0]: hint[1]})
+        return Continuation(
+            {**tangential, **crossed, **{j: self._modes[j] for j in moving}, hint[0]: hint[1]}
+        )
 
-    def _by_trial(self, idle: dict[int, int]) -> Continuation:
+    def _by_trial(self, tangential: dict[int, int]) -> Continuation:
         """At rest on a surface, find by trial the side on which a step stays on its own."""
-        modes = dict(idle)
-        for j in idle:
+        modes = dict(tangential)
+        for j in tangential:
             kept = []
             for side in (1, -1):
                 self._modes[j] = side
                 moved = self._moved(j)
                 if moved == 0 or moved == side:
                     kept.append(side if moved else 0)
-            self._modes[j] = idle[j]
+            self._modes[j] = tangential[j]
             if kept == [1, -1]:
                 return Continuation(None, "it could leave it to either side")
             if not kept:
                 return Continuation(None, "both sides lead back to it with growing speed")
-            modes[j] = kept[0] or idle[j]
+            modes[j] = kept[0] or tangential[j]
         return Continuation(modes)
 
     def _moved(self, j: int) -> int:

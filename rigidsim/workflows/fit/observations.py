@@ -602,14 +602,14 @@ class FitKeys:
 
     def experiment(self, values: Sequence[float] | np.ndarray, base: Experiment) -> Experiment:
         """An experiment at other values, without a text: for runs that nobody keeps."""
-        varied = self._experiment.having(self.overrides(values), writes=False)
+        varied = self._experiment.with_overrides(self.overrides(values), writes=False)
         return replace(base, config=varied.config)
 
     def fitted(self, values: Sequence[float] | np.ndarray) -> Experiment:
         """The config with estimated values written in, and without ``[fit]``."""
         everything = zip(self.all, [*values, *(one.start for one in self.considered)], strict=True)
         moving = [value for one, value in everything if one.clock is None]
-        return self._experiment.having(["fit=", *self.overrides(moving)])
+        return self._experiment.with_overrides(["fit=", *self.overrides(moving)])
 
 
 def _sigma(given: Any, varied: VariedKey, parameter: Any) -> float:

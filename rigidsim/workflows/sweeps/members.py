@@ -714,7 +714,7 @@ def recording(sweep: Sweep) -> Sweep:
     if not recorded:
         recorded = [v.name for v in prepare(sweep.worked_out(first_possible(sweep))).system.recorded]
     names = ", ".join(f'"{name}"' for name in [*recorded, GROWTH])
-    return replace(sweep, base=sweep.base.having([f"output.record=[{names}]"]), added=GROWTH)
+    return replace(sweep, base=sweep.base.with_overrides([f"output.record=[{names}]"]), added=GROWTH)
 
 
 def run_members(
@@ -754,7 +754,7 @@ def single_member(experiment: Experiment, member: int) -> Experiment:
         what = f"given {member}; its members are 0 to {sweep.count - 1}, the last axis runs fastest"
         raise ConfigError(Problem("--member", what), experiment.source)
     name = f"{experiment.config.name}_{member}"
-    return sweep.experiment_of(member).having([f'name="{name}"'])
+    return sweep.experiment_of(member).with_overrides([f'name="{name}"'])
 
 
 def frequencies_of(result: MemoryRun) -> Kept:
