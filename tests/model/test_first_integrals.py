@@ -43,7 +43,7 @@ def followed(name: str, system: Any, axis: int, center: np.ndarray) -> tuple[np.
     [(K, "rates", 0), (K, "quaternion", 1), (G, "quaternion", 0), (G, "quaternion", 2)],
 )
 def test_the_constant_holds(name: str, formulation: str, axis: int) -> None:
-    """Any axis may be that of symmetry, and Kovalevskaya's centre of mass lie anywhere in the equator."""
+    """A body may be symmetric about any axis, Kovalevskaya's centre of mass anywhere in the equator."""
     center = np.roll([0.6, 0.8, 0] if name == K else [1.0, 0, 0], axis - 2)
     system = top(name, axis, center, formulation)
     (found,) = [i for i in system.invariants if i.name in (K, G)]

@@ -185,16 +185,16 @@ def test_a_carrier_in_si_turns_the_body_as_its_formulas_say(seed: int) -> None:
 
 def test_what_knows_the_body_alone_refuses_a_carrier() -> None:
     orbit = {"kind": "gravity_gradient", "gravitational_parameter": 1, "orbit": {"semi_major_axis": 1}}
-    for more, told in (
+    for more, remedy in (
         ({"integrator": {"formulation": "canonical"}, "loads": [orbit]}, "wheel carries angular momentum"),
         ({"model": {"level": "spin_averaged"}, "loads": [orbit]}, "wheel carries angular momentum"),
         ({"integrator": {"method": "closed_form"}}, "a load given from Python has no closed form"),
     ):
-        with pytest.raises(rigidsim.ConfigError, match=told):
+        with pytest.raises(rigidsim.ConfigError, match=remedy):
             rigidsim.run(scene(random.Random(1), 1, 1, 1) | more, out=None, loads=[Wheel(1, 1, 1)])
 
 
-@pytest.mark.parametrize(("load", "told"), [(Scaled(), "leave out factors"), (Timed(), "write m.time")])
-def test_a_load_in_internal_units_is_refused_with_the_remedy(load: Load, told: str) -> None:
-    with pytest.raises(rigidsim.ConfigError, match=told):
+@pytest.mark.parametrize(("load", "remedy"), [(Scaled(), "leave out factors"), (Timed(), "write m.time")])
+def test_a_load_in_internal_units_is_refused_with_the_remedy(load: Load, remedy: str) -> None:
+    with pytest.raises(rigidsim.ConfigError, match=remedy):
         rigidsim.run(scene(random.Random(1), 1, 1, 1), out=None, loads=[load])

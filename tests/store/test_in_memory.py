@@ -40,8 +40,8 @@ def test_events_dates_names_and_exponents_are_the_same(tmp_path: Path) -> None:
 
 def assert_the_same(experiment: rigidsim.Experiment, folder: Path) -> None:
     ran = rigidsim.run(experiment, out=folder), rigidsim.run(experiment, out=None)
-    told = [{k: v for k, v in run.summary.items() if k not in OF_ONE_SUMMARY} for run in ran]
-    assert told[0] == told[1]
+    summaries = [{k: v for k, v in run.summary.items() if k not in OF_ONE_SUMMARY} for run in ran]
+    assert summaries[0] == summaries[1]
     with xarray.open_dataset(next(folder.glob("*/dataset.h5"))) as opened:
         saved = opened.load()
     kept = ran[1].dataset

@@ -87,9 +87,9 @@ def test_torques_too_strong_for_an_average_are_found_by_measurement() -> None:
     """They take a fortieth of the rotation within a wobble: the energy is lost, the momentum's size isn't."""
     loads = 'kind = "viscous_torque"\ncoefficients = [1e-4, 0.1, 1.5e-4]'
     run, full = (run_text(text(level, loads, 50), estimate=True) for level in ("spin_averaged", "full"))
-    told, true = run.summary["modelling"], apart(run, full)
-    assert 0.01 < true["momentum_axis"] <= told["momentum_axis"]
-    assert told["angular_momentum_norm"] < 0.01 < true["energy"] <= told["energy"]
+    announced, true = run.summary["modelling"], apart(run, full)
+    assert 0.01 < true["momentum_axis"] <= announced["momentum_axis"]
+    assert announced["angular_momentum_norm"] < 0.01 < true["energy"] <= announced["energy"]
     assert verdict_on(run.outcome).soundness is Soundness.INACCURATE
     assert len(run.summary["warnings"]) == 2
 
@@ -99,9 +99,9 @@ def test_a_rotation_that_dies_away_is_refused_from_then_on() -> None:
     """It was a division by zero."""
     loads = 'kind = "viscous_torque"\ncoefficients = [1e-3, 1e-3, 1.5e-3]'
     given = rigidsim.parse(text("spin_averaged", loads, 1e7, "principal_moments = [1, 1, 2]"))
-    with pytest.raises(ConfigError, match=r"bring the body to rest after \d+ s .*: end the run by") as told:
+    with pytest.raises(ConfigError, match=r"bring the body to rest after \d+ s .*: end the run by") as caught:
         prepare(given)
-    found = re.search(r"after (\d+) s", str(told.value))
+    found = re.search(r"after (\d+) s", str(caught.value))
     assert found is not None
     # the slower of the decays c / I goes on until 1e-150 of the momentum is left
     assert float(found[1]) == pytest.approx(150 * np.log(10) / 0.75e-3, rel=0.02)

@@ -135,9 +135,9 @@ def test_an_average_is_compared_by_its_axis(tmp_path: Path) -> None:
     assert worth["sun"] == pytest.approx(100 * 15.9 * math.sin(math.radians(23.44)), rel=0.03)
     assert worth["moon"] == pytest.approx(100 * 34.4 * math.sin(math.radians(23.44)), rel=0.03)
     assert plan.least.left_out == ["sun"]
-    told = {row.what: row.why for row in plan.not_assessed}
-    assert "error runs measure" in told["averaging"]
-    rate = float(re.search(r"at most ([\d.]+) arcsec", told["geodetic precession"])[1]) / 100  # type: ignore[index]
+    reasons = {row.what: row.why for row in plan.not_assessed}
+    assert "error runs measure" in reasons["averaging"]
+    rate = float(re.search(r"at most ([\d.]+) arcsec", reasons["geodetic precession"])[1]) / 100  # type: ignore[index]
     assert rate == pytest.approx(0.0192, rel=0.06)  # published: 19.2 mas a year
 
 
@@ -154,9 +154,9 @@ REFUSED: list[tuple[str, dict[str, Any], str]] = [
 
 
 def test_what_makes_no_sense_is_refused(tmp_path: Path) -> None:
-    for error, change, told in REFUSED:
+    for error, change, refusal in REFUSED:
         given = rigidsim.parse(satellite()).replace(change)
-        with pytest.raises(rigidsim.ConfigError, match=told):
+        with pytest.raises(rigidsim.ConfigError, match=refusal):
             rigidsim.required_physics(given, error, out=tmp_path)
     assert not list(tmp_path.iterdir())
     (tmp_path / "scene.toml").write_text(satellite())

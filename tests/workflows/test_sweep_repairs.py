@@ -1,4 +1,4 @@
-"""Sweeps whose folder or config is damaged or wrong: nothing is lost or replaced unasked, and all is told."""
+"""Sweeps whose folder or config is damaged: nothing is lost or replaced unasked, and all is reported."""
 
 import shutil
 from pathlib import Path
@@ -63,10 +63,10 @@ def test_a_damaged_tile_is_told_with_its_remedy_which_works(out: Path, finished:
     content[len(content) // 2] ^= 1
     tile.write_bytes(content)
     for command in ("info", "resume"):
-        told = CliRunner().invoke(app, [command, str(out / "box")])
-        assert told.exit_code == 2
-        assert f"{tile.name}: is damaged or was edited" in told.stderr
-        assert "dataset.h5, which holds its members, is whole" in told.stderr
+        shown = CliRunner().invoke(app, [command, str(out / "box")])
+        assert shown.exit_code == 2
+        assert f"{tile.name}: is damaged or was edited" in shown.stderr
+        assert "dataset.h5, which holds its members, is whole" in shown.stderr
     for _ in range(2):
         with pytest.raises(RunFolderError, match=rf"{tile.name}.*remove it, and rigidsim\.resume"):
             swept(out, LONGER)
@@ -81,9 +81,9 @@ def test_a_torn_dataset_is_written_again(out: Path, finished: Path) -> None:
     path = out / "box" / "dataset.h5"
     content = path.read_bytes()
     path.write_bytes(content[: len(content) // 3])
-    told = CliRunner().invoke(app, ["info", str(out / "box")])
-    assert told.exit_code == 2
-    assert "remove it, and rigidsim resume writes it again" in told.stderr
+    shown = CliRunner().invoke(app, ["info", str(out / "box")])
+    assert shown.exit_code == 2
+    assert "remove it, and rigidsim resume writes it again" in shown.stderr
     path.unlink()
     assert CliRunner().invoke(app, ["resume", str(out / "box")]).exit_code == 0
     assert len(path.read_bytes()) == len(content)
@@ -135,9 +135,9 @@ REFUSED = {
 
 
 def test_a_bad_sweep_is_told_where_and_why(tmp_path: Path) -> None:
-    for table, told in REFUSED.values():
+    for table, refusal in REFUSED.values():
         with pytest.raises(ConfigError) as caught:
             swept(tmp_path, CONFIG.partition("[sweep]")[0] + f"[sweep]\n{table}\n")
-        assert told in str(caught.value)
+        assert refusal in str(caught.value)
         assert len(caught.value.problems) == 1
     assert not list(tmp_path.iterdir())

@@ -642,8 +642,8 @@ def _refuse_what_one_body_has(around: Setting) -> None:
             continue
         beside = [key for key in LOADS["beside"] if getattr(load, key, None) not in (None, 2)]
         what = f"given with [[{_TABLE}]]; distant sources act on both tensors of inertia alone: remove it"
-        for key in beside:
-            raise here.fault(key, what)
+        if beside:
+            raise here.fault(beside[0], what)
 
 
 def _built(fields: RigidBodyTable, around: Setting) -> RigidBody:

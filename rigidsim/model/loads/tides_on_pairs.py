@@ -7,8 +7,8 @@ as points are accelerated relative to each other by
     k - 1 = q (3 + 3 q + q^2) / (1 + k),
 
 which loses no digits where the source is far (Battin 1999, An Introduction to the Mathematics and Methods of
-Astrodynamics, section 8.4). Forces on both figures to second degree, and the torque on the second one, are
-those of ``Attraction``, seen from each body.
+Astrodynamics, section 8.4). Forces on both figures to second degree, and the torque on the second one, follow
+``Attraction``, seen from each body.
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@ With r from ``[body]`` to the second body, v its rate, d = -r / |r| and n the un
 
     separation = |r|,    mutual_period = 2 pi r^2 / |r x v|,    yaw = atan2(e . (n x d), e . d),
 
-where e is the second body's longest axis, the end nearer to ``[body]`` at the start. The period is that of
-a turn at the present rate of the line between both: on a circular orbit the time of a revolution, while
+where e is the second body's longest axis, the end nearer to ``[body]`` at the start. The period is a
+turn's at the present rate of the line between both: on a circular orbit the time of a revolution, while
 Kepler's period of the osculating orbit isn't, since the figures attract as well. The mean of ``orbit_angle``
 over many turns gives the mean period.
 """
